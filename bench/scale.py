@@ -20,7 +20,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from wrist_stiffness.commands.compare import compare
-from wrist_stiffness.commands.fleet import map_recordings
+from wrist_stiffness.commands.fleet import spread
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.commands.simulate import simulate_recording
@@ -95,7 +95,7 @@ def main() -> None:
             shutil.copyfile(first, paths[-1])
 
         def compare_each(count: int, workers: int) -> None:
-            rows = map_recordings(compared, paths[:count], workers=workers)
+            rows = spread(compared, paths[:count], workers=workers)
             if errors := [row.error for row in rows if row.error]:
                 raise SystemExit(f"{len(errors)} of {count} failed: {errors[0]}")
 

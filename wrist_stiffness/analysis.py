@@ -43,9 +43,9 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.registry import effect_named
-from wrist_stiffness.planning.earlier import as_experiment
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
 from wrist_stiffness.planning.question import between
+from wrist_stiffness.planning.timeline import as_experiment
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.contents import Contents, contents_of
 from wrist_stiffness.sessions.measured_session import MeasuredSession

@@ -9,8 +9,7 @@ import numpy as np
 from before_after import Pass, rms
 from run_demo import DemoResult, Fault
 
-from wrist_stiffness.report.pictures.figure import new_figure, save_figure
-from wrist_stiffness.report.pictures.palette import FLOOR, colour
+from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure, save_figure
 
 CANDIDATES = 5
 """The most probable ones are drawn."""

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.identification.proposal import twins
-from wrist_stiffness.report.pictures.figure import new_figure, save_figure
-from wrist_stiffness.report.pictures.palette import FLOOR, colour
+from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure, save_figure
 
 Line = Mapping[str, Any]
 

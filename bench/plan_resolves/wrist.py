@@ -55,7 +55,7 @@ def paper_design() -> Timeline:
 
 def performance(visits: list[Visit]) -> Timeline:
     """Return visits one after the other."""
-    return run_through(visits, WORKSPACE, PACE, np.zeros(2))
+    return run_through(visits, WORKSPACE, PACE)
 
 
 def once_each(timeline: Timeline) -> Timeline:

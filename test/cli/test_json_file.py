@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from wrist_stiffness.cli.output import write_json
+from wrist_stiffness.cli.parser import write_json
 from wrist_stiffness.errors import InputError
 
 

@@ -21,7 +21,7 @@ from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file
 
 DEADLINE_S = 120.0
-PICTURES = "wrist_stiffness.report.table_pictures"
+PICTURES = "wrist_stiffness.report.pictures.table"
 
 CHECKS = {
     "file",

@@ -7,7 +7,7 @@ from matplotlib.image import imread
 from wrist_stiffness.commands.budget import Push, budget
 from wrist_stiffness.errors import LoadRangeError
 from wrist_stiffness.report.pictures.bent_wrist import bent_shapes
-from wrist_stiffness.report.table_pictures import draw_maps
+from wrist_stiffness.report.pictures.table import draw_maps
 
 
 def test_rated_budget_is_the_paper_map(table):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.cli.main import main
-from wrist_stiffness.commands.fleet import FleetRow
+from wrist_stiffness.commands.fleet import Answer
 from wrist_stiffness.report.fleet_lines import compared_lines
 from wrist_stiffness.shipped import shipped_file
 
@@ -131,7 +131,7 @@ def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong()
     mistake = "Look at the set-up first: with positions times 1000 the error falls"
     model = {"model": "wrist_7", "after_registration": {"s_um": {"rms": 4.9}}, "depends_on": []}
     values = {"models": [model], "instrument_noise": {"s_um": 0.004}, "verdict": ["off", mistake]}
-    rows = (FleetRow(Path("a"), values), FleetRow(Path("b"), None, "no recording"))
+    rows = (Answer(Path("a"), values), Answer(Path("b"), None, "no recording"))
     title, _, row, _, _, told = compared_lines(rows)
     assert title.startswith("wrist_7, RMS with registrations")
     assert row.split()[:3] == ["a", "4.9", "0.004"]
@@ -144,7 +144,7 @@ def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong()
 
 @pytest.mark.parametrize("error", ["b/c.mcap: no pose", "b/c.mcap no pose", "no pose"])
 def test_a_fleet_names_each_recording_once(error):
-    rows = (FleetRow(Path("b/c.mcap"), None, error),)
+    rows = (Answer(Path("b/c.mcap"), None, error),)
     assert compared_lines(rows)[-1].split(maxsplit=1) == [
         "b/c.mcap",
         "not compared: no pose",

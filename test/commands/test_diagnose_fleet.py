@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from wrist_stiffness.cli.main import main
-from wrist_stiffness.commands.fleet import FleetRow
+from wrist_stiffness.commands.fleet import Answer
 from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
 
@@ -28,14 +28,14 @@ def diagnosed(verdict, *classes, mistake="", keys=("s_um", "phi_mdeg")):
 def test_each_wrist_has_a_line_that_says_what_is_missing():
     look = "Look at the set-up first: with the load's sign turned a fit leaves less"
     rows = (
-        FleetRow(Path("a.mcap"), diagnosed("none")),
-        FleetRow(Path("b.mcap"), diagnosed("effect", ["backlash@motor_2"])),
-        FleetRow(
+        Answer(Path("a.mcap"), diagnosed("none")),
+        Answer(Path("b.mcap"), diagnosed("effect", ["backlash@motor_2"])),
+        Answer(
             Path("c.mcap"),
             diagnosed("unknown", ["creep@joint_1", "drift@pose_sensor"], mistake=look),
         ),
-        FleetRow(Path("d.mcap"), diagnosed("unknown", keys=("phi_mdeg",))),
-        FleetRow(Path("e.mcap"), None, "e.mcap: no measured pose"),
+        Answer(Path("d.mcap"), diagnosed("unknown", keys=("phi_mdeg",))),
+        Answer(Path("e.mcap"), None, "e.mcap: no measured pose"),
     )
     lines = diagnosed_lines(rows)
     said = {line.split()[0]: line for line in lines[2:7]}

@@ -11,12 +11,7 @@ import pytest
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands import extend as workflow
-from wrist_stiffness.commands.extend import (
-    FormulaEffect,
-    direction_of,
-    extend_model,
-    own_effect,
-)
+from wrist_stiffness.commands.extend import FormulaEffect, direction_of, extend_model, own_effect
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.commands.replay import replay

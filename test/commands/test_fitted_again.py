@@ -106,7 +106,8 @@ def test_no_model_is_written_where_asking_for_a_mistake_fails(recorded, tmp_path
     def refused(*_):
         raise InputError("too little to compare")
 
-    monkeypatch.setattr(calibrate, "_mistake", refused)
+    for asking in ("suspicion_in", "doubts_load"):
+        monkeypatch.setattr(calibrate, asking, refused)
     with pytest.raises(InputError, match="too little"):
         calibrate_model(SHIPPED, Recordings([recorded(1)], {}), tmp_path / "mine.yaml", RUN)
     assert not (tmp_path / "mine.yaml").exists()

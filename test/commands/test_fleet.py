@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from wrist_stiffness.commands.fleet import attempt, map_recordings, spread
+from wrist_stiffness.commands.fleet import attempt, spread
 from wrist_stiffness.errors import RecordingError
 
 # Workers cannot import this file, as pytest can: what they call is Python's own.
@@ -22,7 +22,7 @@ def test_an_error_is_one_line():
     def refuse(path):
         raise RecordingError(f"{path} is no\nrecording")
 
-    assert attempt(refuse, Path("bad")) == (None, "bad is no recording")
+    assert attempt(refuse, Path("bad")) == (Path("bad"), None, "bad is no recording")
 
 
 @pytest.mark.slow
@@ -31,8 +31,8 @@ def test_processes_of_this_machine_answer_in_the_order_of_the_paths(tmp_path):
     for path in (paths[0], paths[2]):
         path.write_text(f"read {path.name}")
     told = []
-    rows = map_recordings(READS, paths, workers=2, progress=lambda *counts: told.append(counts))
-    assert [row.path for row in rows] == paths
+    rows = spread(READS, paths, workers=2, progress=lambda *counts: told.append(counts))
+    assert [row.item for row in rows] == paths
     assert [row.result for row in rows] == ["read good", None, "read best"]
     assert [row.error[:17] for row in rows] == ["", "FileNotFoundError", ""]
     assert told == [(1, 3), (2, 3), (3, 3)]
@@ -52,20 +52,20 @@ def unknown_to_workers(path):
 
 @pytest.mark.slow
 def test_a_function_that_workers_cannot_load_is_the_rows_error():
-    for row in map_recordings(unknown_to_workers, [Path("a"), Path("b")]):
+    for row in spread(unknown_to_workers, [Path("a"), Path("b")]):
         assert "ModuleNotFoundError" in row.error
 
 
 def test_one_recording_needs_no_other_process():
-    (row,) = map_recordings(lambda _: os.getpid(), [Path("good")])
+    (row,) = spread(lambda _: os.getpid(), [Path("good")])
     assert row.result == os.getpid()
 
 
 @pytest.mark.slow
 def test_a_worker_that_dies_is_an_answer_with_its_error():
     dead, good = spread(eval, ["__import__('os')._exit(7)", "2 + 2"], workers=1)
-    assert dead == (None, "the worker died: exit code 7")
-    assert good == (4, "")
+    assert dead[1:] == (None, "the worker died: exit code 7")
+    assert good[1:] == (4, "")
 
 
 DIES_ONCE = """
@@ -97,7 +97,7 @@ HANGING = """
 import sys
 from pathlib import Path
 from threading import Event
-from wrist_stiffness.commands.fleet import map_recordings
+from wrist_stiffness.commands.fleet import spread
 
 def hang(path):
     path.write_text("begun")
@@ -107,7 +107,7 @@ def hang(path):
 
 if __name__ == "__main__":
     try:
-        map_recordings(hang, [Path(name) for name in sys.argv[1:]], workers=2)
+        spread(hang, [Path(name) for name in sys.argv[1:]], workers=2)
     except KeyboardInterrupt:
         sys.exit(130)
 """

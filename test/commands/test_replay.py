@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from replayed import MILLISECOND, MOTORS, joints, load, outputs, shifts, write
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
@@ -22,7 +23,6 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
-    JointState,
     JointTrajectory,
     JointTrajectoryPoint,
     Quaternion,
@@ -32,25 +32,11 @@ from wrist_stiffness.recording.messages import (
     Transform,
     TransformStamped,
     Vector3,
-    Wrench,
-    WrenchStamped,
 )
-from wrist_stiffness.recording.reader import open_recording
-from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.shipped import shipped_file
 
 MODEL = shipped_file("config/palmieri2015_model.yaml")
 STORE = get_typestore(Stores.ROS2_JAZZY)
-MILLISECOND = 1_000_000
-MOTORS = ("motor_1_joint", "motor_2_joint")
-
-
-def joints(stamp_ns, degrees, names=MOTORS):
-    return JointState(Header(stamp_ns), names, tuple(np.radians(degrees).tolist()))
-
-
-def load(stamp_ns, force, frame="wrist_base"):
-    return WrenchStamped(Header(stamp_ns, frame), Wrench(Vector3(*force), Vector3()))
 
 
 COMMAND = dataclasses.replace(
@@ -68,22 +54,6 @@ TIMELINE = [
     (30, "/motor_commands", COMMAND),
     (31, "/load_estimate", load(20 * MILLISECOND, (0.0, 0.0, -2.0))),
 ]
-
-
-def write(path, timeline):
-    with RecordingWriter(path) as writer:
-        for at_ms, topic, message in timeline:
-            writer.write(topic, message, at_ms * MILLISECOND)
-    return path
-
-
-def outputs(path, topic):
-    return [message for _, _, message in open_recording(path).messages([topic])]
-
-
-def shifts(path):
-    points = [m.pose.pose.position for m in outputs(path, "/pose_error_predicted")]
-    return np.array([(p.x, p.y, p.z) for p in points])
 
 
 def test_load_belongs_by_stamp_not_by_arrival(tmp_path):
@@ -301,7 +271,7 @@ def warm_timeline(covariate="/covariates/humidity"):
 def test_temperatures_and_covariates_are_heard_as_by_the_nodes(tmp_path, warm_and_humid, covariate):
     source = write(tmp_path / "in", warm_timeline(covariate))
     names = {} if covariate.startswith("/covariates") else {"/covariates/humidity": covariate}
-    summary = replay(source, warm_and_humid, tmp_path / "out", topics=names)
+    summary = replay(source, warm_and_humid, tmp_path / "out", remaps=names)
     assert not summary.warnings
     wanted = (
         load_model(warm_and_humid)

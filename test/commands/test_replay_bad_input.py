@@ -2,53 +2,21 @@
 
 import numpy as np
 import pytest
+from replayed import MILLISECOND, MOTORS, joints, load, shifts, write
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.recording.messages import (
-    Header,
-    JointState,
-    String,
-    Vector3,
-    Wrench,
-    WrenchStamped,
-)
-from wrist_stiffness.recording.reader import open_recording
-from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.recording.messages import String
 from wrist_stiffness.shipped import shipped_file
 
 MODEL = shipped_file("config/palmieri2015_model.yaml")
-MILLISECOND = 1_000_000
-MOTORS = ("motor_1_joint", "motor_2_joint")
-
-
-def joints(stamp_ns, degrees, names=MOTORS):
-    return JointState(Header(stamp_ns), names, tuple(np.radians(degrees).tolist()))
-
-
-def load(stamp_ns, force, frame="wrist_base"):
-    return WrenchStamped(Header(stamp_ns, frame), Wrench(Vector3(*force), Vector3()))
 
 
 TIMELINE = [
     (0, "/load_estimate", load(0, (0.0, 0.0, -1.0))),
     (10, "/joint_states", joints(10 * MILLISECOND, (5.0, 10.0))),
 ]
-
-
-def write(path, timeline):
-    with RecordingWriter(path) as writer:
-        for at_ms, topic, message in timeline:
-            writer.write(topic, message, at_ms * MILLISECOND)
-    return path
-
-
-def shifts(path):
-    """Predicted shifts (n, 3) of a replay [m]."""
-    told = open_recording(path).messages(["/pose_error_predicted"])
-    points = [message.pose.pose.position for _, _, message in told]
-    return np.array([(p.x, p.y, p.z) for p in points])
 
 
 FAULTS = {
@@ -160,7 +128,7 @@ def test_recordings_that_cannot_be_used(tmp_path, capsys):
         replay(only_loads, MODEL, tmp_path / "out")
     whole = write(tmp_path / "whole", TIMELINE)
     with pytest.raises(RecordingError, match="no topic /cmd .*--topic /motor_commands:=ACTUAL"):
-        replay(whole, MODEL, tmp_path / "out", topics={"/motor_commands": "/cmd"})
+        replay(whole, MODEL, tmp_path / "out", remaps={"/motor_commands": "/cmd"})
     assert not (tmp_path / "out").exists()
     assert main(["replay", str(tmp_path / "none"), "-o", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err

@@ -1,3 +1,5 @@
+"""A page of a report: one file, and whatever comes in stays text."""
+
 import base64
 import os
 import re
@@ -6,6 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.report import comparison_report
 from wrist_stiffness.report.page import (
     Bullets,
     Page,
@@ -104,3 +107,10 @@ def test_a_name_that_is_no_text_is_shown_by_its_bytes(tmp_path):
 def test_a_folder_that_is_missing_is_named(tmp_path):
     with pytest.raises(InputError, match="missing/out.html"):
         write_page(tmp_path / "missing" / "out.html", page("x"))
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(None, "-"), (0.884, "88 %"), (1.0, "all"), (2.39, "all"), (-0.2, "-20 %")]
+)
+def test_a_share_is_never_more_than_all(share, text):
+    assert comparison_report._share(share) == text

@@ -7,12 +7,11 @@ import pytest
 from scipy.stats import rankdata
 
 from wrist_stiffness.comparing.compare import compare_models
-from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
+from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, worst_poses
 from wrist_stiffness.comparing.curve import ranks
 from wrist_stiffness.comparing.explained import explain
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.comparing.set_up import without_set_up
-from wrist_stiffness.comparing.worst_poses import worst_poses
 from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.identification.likelihood import KNOWN, SURE_OF_NOISE
 from wrist_stiffness.sessions.unit_session import as_units

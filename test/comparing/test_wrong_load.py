@@ -8,9 +8,9 @@ import pytest
 
 from wrist_stiffness.commands import diagnose
 from wrist_stiffness.commands.diagnose import mistake_beside
-from wrist_stiffness.comparing import wrong_load as module
+from wrist_stiffness.comparing import compare as module
+from wrist_stiffness.comparing.compare import wrong_load
 from wrist_stiffness.comparing.wiring import LOAD_MISTAKES, MISTAKES, Suspicion
-from wrist_stiffness.comparing.wrong_load import wrong_load
 from wrist_stiffness.identification.base_fit import fit_base
 from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.identification.taken_up import TakenUp, taken_up

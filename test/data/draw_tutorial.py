@@ -21,11 +21,10 @@ from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.formula_law import TURNS
-from wrist_stiffness.report.parts import against, unit_of
+from wrist_stiffness.report.parts import unit_of
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars
-from wrist_stiffness.report.pictures.figure import new_figure
-from wrist_stiffness.report.pictures.palette import FLOOR, colour
+from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure
 from wrist_stiffness.shipped import shipped_file
 
 RECORDINGS = Path(__file__).parent / "tutorial"
@@ -64,7 +63,7 @@ def draw(name: str, folder: Path) -> None:
     else:
         told = next(each for each in found.models[0].explained.told if topic in each.members)
         others = [(model.name, model.refitted) for model in found.models[1:]]
-        figure = draw_against([against(told.curve, told.name, others)])
+        figure = draw_against([told], others)
     figure.savefig(PICTURES / f"{name}-shown.png", dpi=130)
 
 

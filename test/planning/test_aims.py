@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.planning.aims import Aims
+from wrist_stiffness.planning.aims import Aims, Truths
 from wrist_stiffness.planning.information import Goal, Information, Layout
-from wrist_stiffness.planning.truths import Truths
 
 SEEN = Goal("a", "")
 NOTHING = np.zeros((2, 2))

@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.registry import effect_named
-from wrist_stiffness.planning.earlier import as_experiment
+from wrist_stiffness.planning.aims import after_data, as_asked
 from wrist_stiffness.planning.information import (
     CHARGE,
     FREE,
@@ -25,15 +25,10 @@ from wrist_stiffness.planning.information import (
     whitened,
 )
 from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad
-from wrist_stiffness.planning.question import (
-    SESSION,
-    between,
-    commissioning,
-)
-from wrist_stiffness.planning.rivals import LEAST_WHITE, Rivals
+from wrist_stiffness.planning.question import SESSION, between, commissioning
+from wrist_stiffness.planning.rivals import LEAST_WHITE, dwell_noise
 from wrist_stiffness.planning.signatures import plausible, signatures
-from wrist_stiffness.planning.timeline import LOAD_RAMP_S, Pace, Visit, run_through
-from wrist_stiffness.planning.truths import after_data, as_asked
+from wrist_stiffness.planning.timeline import LOAD_RAMP_S, Pace, Visit, as_experiment, run_through
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 LOAD = AppliedLoad(
@@ -61,7 +56,7 @@ def timeline(model):
         for number in range(9)
     ]
     pace = Pace(np.radians(30.0), 2.0, True)
-    return run_through(visits, model.table.workspace, pace, np.zeros(2))
+    return run_through(visits, model.table.workspace, pace)
 
 
 @pytest.fixture(scope="module")
@@ -371,7 +366,7 @@ def test_a_load_changes_as_slowly_as_its_source_says_and_no_faster_than_a_hand(m
     load = replace(LOAD, change_s=change_s)
     pose, pace = np.radians([10.0, 5.0]), Pace(np.radians(30.0), 2.0, True)
     visit = Visit(pose, np.ones(2), load)
-    found = run_through([visit], model.table.workspace, pace, np.zeros(2))
+    found = run_through([visit], model.table.workspace, pace)
     empty, full = (each.time_s for each in found.dwells)
     lasts = max(change_s, LOAD_RAMP_S)
     assert full - empty == pytest.approx(pace.dwell_s + lasts)
@@ -385,7 +380,7 @@ def test_the_noise_of_a_dwell_is_its_floor_less_the_hidden_count(model, count):
     jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
     hidden = np.sum(jacobian**2) * table.geometry.limits.encoder_step**2 / 12.0
     shift, square = 2e-6, hidden / count
-    noise = Rivals((), (), (shift, float(np.sqrt(square)))).noise(table)
+    noise = dwell_noise(table, (shift, float(np.sqrt(square))))
     assert np.sum(noise.white[:3] ** 2) == pytest.approx(shift**2)
     white = max(1.0 - count, LEAST_WHITE) * square
     assert np.sum(noise.white[3:] ** 2) == pytest.approx(white)

@@ -39,7 +39,7 @@ def experiment(model, first=0):
     load = AppliedLoad("1 N", np.array([0.0, 0.0, -1.0]), *np.zeros((2, 3)), False, False, 1.0)
     angles = np.radians([-20.0, -7.0, 7.0, 20.0])
     visits = [Visit(np.array([x, y]), np.ones(2), load, True) for x in angles for y in angles]
-    return run_through(visits[first:], model.table.workspace, PACE, np.zeros(2))
+    return run_through(visits[first:], model.table.workspace, PACE)
 
 
 @pytest.fixture(scope="module")

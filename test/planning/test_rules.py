@@ -97,16 +97,16 @@ def test_between_rivals_poses_may_be_moved_outward(model, whole, further):
         model.table.workspace, asked.sources, model.table.geometry.gravity, generator()
     )
     known = {tuple(each.theta) for each in drawn}
-    visits = planning._drawn(model, asked, whole, generator()).visits_of(range(len(drawn)))
+    visits = planning._Pool(model, asked, whole, generator()).visits_of(range(len(drawn)))
     assert {tuple(each.theta) for each in visits} <= known
-    every = planning._drawn(model, asked, whole, generator()).timeline.dwells
+    every = planning._Pool(model, asked, whole, generator()).timeline.dwells
     reach = max(np.linalg.norm(each.visit.theta) for each in every)
     assert (reach > 1.05 * max(np.linalg.norm(theta) for theta in known)) == further
 
 
 def test_a_plan_without_room_for_a_visit_is_the_shortest_one(model):
     """Arranged anew it would draw another warm-up, which may be too long."""
-    settings, rng = planning._drawn(model, conditions(model), False, generator()), generator()
+    settings, rng = planning._Pool(model, conditions(model), False, generator()), generator()
     shortest = settings.arranged([], rng)
     visits, timeline = settings.within(shortest.duration_s, [0, 1], shortest, rng)
     assert visits == []
@@ -284,6 +284,6 @@ def test_time_rises_however_fast_the_motors_are(model, speed_deg_per_s):
     """What is sampled just before an observed moment lies after the one observed before it."""
     pace = Pace(np.radians(speed_deg_per_s), 2.0, True)
     visit = Visit(np.array([0.3, -0.2]), np.array([1.0, 1.0]))
-    timeline = run_through([visit], model.table.workspace, pace, np.zeros(2))
+    timeline = run_through([visit], model.table.workspace, pace)
     assert np.all(np.diff(timeline.block.time) >= 0.0)
     assert timeline.moving.sum() == 3

@@ -164,7 +164,7 @@ def test_a_recording_comes_back_to_the_bit(tmp_path, campaign, table):
     import_csv(tmp_path / "one.csv", tmp_path / "again")
     export_csv(tmp_path / "again", tmp_path / "two.csv", table)
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
-    once = read_session(tmp_path / "bag", table, frames=settings.frames)
+    once = read_session(tmp_path / "bag", table, settings=settings)
     twice = read_session(tmp_path / "again", table)
     np.testing.assert_array_equal(once.block.time, twice.block.time)
     np.testing.assert_array_equal(once.block.theta, twice.block.theta)

@@ -82,7 +82,7 @@ def imported(folder, block, readings, header="a_um,b_um,c_um,d_um,e_um,level_mde
     table.write_text("\n".join([f"{SETTINGS},{header}", *lines, ""]))
     described = GAUGES_YAML.splitlines(keepends=True)
     gauges.write_text("".join(described[: 2 + readings.shape[1]]))
-    return import_csv(table, folder / "bag.mcap", gauges_file=gauges).path
+    return import_csv(table, folder / "bag.mcap", gauges_file=gauges).recording
 
 
 @pytest.mark.parametrize("gauge", GAUGES, ids=[each.name for each in GAUGES])

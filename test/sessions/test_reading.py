@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.load_history import LoadHistory
+from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, StaleLoadError
 from wrist_stiffness.model.block import Load
 from wrist_stiffness.recording import open_recording, read_samples
@@ -166,7 +167,9 @@ def test_loads_are_moved_to_O_as_the_nodes_move_them(tmp_path, campaign, table):
     sensor = SensorFrame("wrist_platform", turn, np.array([0.01, 0.02, 0.03]), "environment")
     frames = Frames({"ft": sensor})
     campaign.with_joints().with_loads("ft", lambda i: (0.5, 0.01 * i, -1.0)).with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table, frames=frames)
+    session = read_session(
+        campaign.written(tmp_path / "bag"), table, settings=StreamSettings(frames=frames)
+    )
     expected = [frames.load("ft", (0.5, 0.01 * i, -1.0), (0.0, 0.0, 0.0)) for i in range(799)]
     np.testing.assert_allclose(session.block.load, [load.wrench for load in expected], atol=1e-15)
     assert session.block.load_on_platform
@@ -274,7 +277,7 @@ def test_poses_of_a_mapped_frame_are_turned_into_F(tmp_path, campaign, table):
     campaign.with_poses((shift - origin) @ turn, turn.T @ campaign.rigid(campaign.pose_ns))
     path = campaign.written(tmp_path / "bag")
     frames = Frames({"tracker": SensorFrame("wrist_base", turn, origin)})
-    session = read_session(path, table, frames=frames)
+    session = read_session(path, table, settings=StreamSettings(frames=frames))
     np.testing.assert_allclose(session.shift, shift, atol=1e-15)
     np.testing.assert_allclose(session.rotation, campaign.rigid(campaign.pose_ns), atol=1e-13)
     with pytest.raises(FrameError, match="'tracker'"):

@@ -18,6 +18,15 @@ def paused(campaign, first, last):
     return campaign
 
 
+@pytest.fixture
+def resting(campaign, monkeypatch):
+    """A campaign in which the motors stand still."""
+    monkeypatch.setattr(
+        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
+    )
+    return campaign
+
+
 def test_where_joint_states_pause_in_motion_poses_have_no_angles(tmp_path, campaign, table):
     """A straight way from one to the next is 9 deg wrong in the middle of a second."""
     paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
@@ -31,12 +40,9 @@ def test_where_joint_states_pause_in_motion_poses_have_no_angles(tmp_path, campa
     assert error.max() < np.radians(0.25)
 
 
-def test_where_joint_states_pause_at_rest_nothing_is_lost(tmp_path, campaign, table, monkeypatch):
-    monkeypatch.setattr(
-        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
-    )
-    paused(campaign.with_joints(), 300, 400).with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
+def test_where_joint_states_pause_at_rest_nothing_is_lost(tmp_path, resting, table):
+    paused(resting.with_joints(), 300, 400).with_loads().with_poses()
+    session = read_session(resting.written(tmp_path / "bag"), table)
     assert session.measured.all()
     assert len(session) == 799
 
@@ -105,27 +111,19 @@ def test_poses_after_the_last_reading_are_not_said_to_lack_joint_states(tmp_path
     assert [remark.split()[0] for remark in told] == [str(799 - len(session))]
 
 
-def test_between_rare_joint_states_at_rest_nothing_is_lost(tmp_path, campaign, table, monkeypatch):
-    monkeypatch.setattr(
-        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
-    )
-    campaign.with_joints()
-    campaign.entries = campaign.entries[::80]
-    campaign.with_loads().with_poses(stamps=campaign.pose_ns[:700])
-    session = read_session(campaign.written(tmp_path / "bag"), table)
+def test_between_rare_joint_states_at_rest_nothing_is_lost(tmp_path, resting, table):
+    resting.with_joints()
+    resting.entries = resting.entries[::80]
+    resting.with_loads().with_poses(stamps=resting.pose_ns[:700])
+    session = read_session(resting.written(tmp_path / "bag"), table)
     assert session.measured.all()
     assert len(session) == 700
 
 
-def test_far_from_any_joint_state_a_wrist_that_seems_at_rest_is_not_known(
-    tmp_path, campaign, table, monkeypatch
-):
+def test_far_from_any_joint_state_a_wrist_that_seems_at_rest_is_not_known(tmp_path, resting, table):
     """It may have gone and come back: a second and a half is told to half a second off its ends."""
-    monkeypatch.setattr(
-        type(campaign), "theta", lambda own, time_ns: np.full((len(time_ns), 2), 0.1)
-    )
-    paused(campaign.with_joints(), 300, 450).with_loads().with_poses()
-    session = read_session(campaign.written(tmp_path / "bag"), table)
+    paused(resting.with_joints(), 300, 450).with_loads().with_poses()
+    session = read_session(resting.written(tmp_path / "bag"), table)
     (why,) = session.remarks
     assert why.startswith(f"{799 - len(session)} measured poses are not used: no joint state")
     assert 48 <= 799 - len(session) <= 51
@@ -212,9 +210,10 @@ def test_a_motor_that_moves_into_a_long_pause_has_no_angles_in_it():
         theta = np.radians(speed) * np.stack([way, way], axis=1)
         time_ns = np.round(1e9 * time).astype(np.int64)
         still = Signal(time_ns, np.zeros((len(time), 6)))
-        machine = MachineSignals(Signal(time_ns, theta), None, still, False, {}, {})
+        signals = Signal(time_ns, theta), None, still, False, {}, {}
+        machine = MachineSignals(*signals, load_age_limit_s=100.0)
         poses = np.round(1e9 * (9.99 + np.array([0.1, 0.2, 0.3, 0.45]))).astype(np.int64)
-        assert (machine.usable(poses, 100.0)[0] == known).all()
+        assert (machine.usable(poses)[0] == known).all()
 
 
 def test_speeds_of_repeated_angles_are_taken_when_they_were_read(tmp_path, campaign, table):

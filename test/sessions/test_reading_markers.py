@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.readout import fit_markers
-from wrist_stiffness.sessions.reading.marker_poses import poses_from_markers
+from wrist_stiffness.sessions.reading.pose_track import poses_from_markers
 from wrist_stiffness.sessions.reading.session import read_session
 
 NAN = float("nan")

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.export_csv import export_csv
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
+from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError
 from wrist_stiffness.recording.messages import (
     Header,
@@ -56,7 +57,7 @@ def test_poses_are_turned_by_a_chain_of_fixed_transforms(tmp_path, tracked, tabl
     assert first["x_mm"] == pytest.approx(1e3 * tracked.shift[0, 0], abs=1e-12)
     # What the user maps goes before what the recording says.
     mapped = Frames({"tracker": SensorFrame("wrist_base", TURN.as_matrix(), ORIGIN + 1e-3)})
-    moved = read_session(path, table, frames=mapped)
+    moved = read_session(path, table, settings=StreamSettings(frames=mapped))
     np.testing.assert_allclose(moved.shift, tracked.shift + 1e-3, atol=1e-15)
 
 

@@ -169,7 +169,7 @@ def test_another_reading_or_delay_makes_old_answers_stale(solver, bench, monkeyp
     run.version_of(solver)
     [(modules, files)] = asked
     sources = {path.relative_to(tools.PACKAGE).as_posix() for path in tools._sources(modules)}
-    assert {"sessions/reading/spikes.py", "simulation/laws/time_delay.py"} <= sources
+    assert {"sessions/reading/lost_beams.py", "simulation/laws/time_delay.py"} <= sources
     assert {"observe.py", "own_diagnosis.py"} <= set(files)
 
 

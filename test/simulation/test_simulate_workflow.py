@@ -13,7 +13,7 @@ from wrist_stiffness.cli import simulate as command
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.cli.simulate import in_usual_units
 from wrist_stiffness.commands import simulate as workflow
-from wrist_stiffness.commands.simulate import hide, hide_blind, simulate_recording
+from wrist_stiffness.commands.simulate import hide, secret, simulate_recording
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.recording import open_recording, read_samples
@@ -229,4 +229,4 @@ def test_an_instrument_without_noise_has_no_size_of_an_effect(wrist):
     with pytest.raises(InputError, match="'ideal' has none"):
         hide("backlash@motor_2", 2.0, wrist(), ideal, 6.0)
     with pytest.raises(InputError, match="'ideal' has none"):
-        hide_blind(7, wrist(), ideal, 6.0)
+        secret(7, wrist(), ideal, 6.0)

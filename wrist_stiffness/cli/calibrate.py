@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.options import (
-    add_fit,
-    add_model,
-    model_named,
-    recordings_named,
-)
-from wrist_stiffness.cli.output import say, this_run
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.options import add_fit, add_model, model_named, recordings_named
+from wrist_stiffness.cli.parser import Commands, add_command, say, this_run
 
 DESCRIPTION = """\
 Commissioning. Fit what differs from session to session (registration of the pose sensor, its target

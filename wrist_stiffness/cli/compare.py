@@ -5,13 +5,8 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from wrist_stiffness.cli.options import (
-    add_compared_recordings,
-    for_each,
-    recordings_named,
-)
-from wrist_stiffness.cli.output import say, this_run
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.options import add_compared_recordings, for_each, recordings_named
+from wrist_stiffness.cli.parser import Commands, add_command, say, this_run
 from wrist_stiffness.shipped import shipped_file
 
 DESCRIPTION = """\

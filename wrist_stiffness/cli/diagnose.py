@@ -12,8 +12,7 @@ from wrist_stiffness.cli.options import (
     model_named,
     recordings_named,
 )
-from wrist_stiffness.cli.output import say, this_run
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say, this_run
 
 DESCRIPTION = """\
 Say which physical effect a model misses, from recordings with a measured pose of the platform.

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 
 from wrist_stiffness.cli.options import add_sensor_names, recordings_named, table_named
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say
 
 DESCRIPTION = """\
 Write the measured poses of a recording as a table, one row each, with the motor angles, the load at
@@ -47,12 +47,6 @@ def _run(arguments: argparse.Namespace) -> int:
         progress=Progress("rows"),
     )
     turns = f", {found.turns} rows of the way between them" if found.turns else ""
-    lines = [f"{found.path}: {found.rows} measured poses{turns}"]
+    lines = [f"{found.table}: {found.rows} measured poses{turns}"]
     lines += [f"  {remark}" for remark in found.remarks]
-    values = {
-        "table": str(found.path),
-        "rows": found.rows,
-        "turns": found.turns,
-        "remarks": found.remarks,
-    }
-    return say(arguments, lines, values)
+    return say(arguments, lines, {**asdict(found), "table": str(found.table)})

@@ -5,14 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from wrist_stiffness.cli.options import (
-    add_fit,
-    add_model,
-    model_named,
-    recordings_named,
-)
-from wrist_stiffness.cli.output import say, this_run
-from wrist_stiffness.cli.parser import Commands, add_command, named_numbers
+from wrist_stiffness.cli.options import add_fit, add_model, model_named, recordings_named
+from wrist_stiffness.cli.parser import Commands, add_command, named_numbers, say, this_run
 from wrist_stiffness.errors import InputError
 
 if TYPE_CHECKING:

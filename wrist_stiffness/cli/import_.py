@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
@@ -79,10 +79,8 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     days = found.seconds / 86400.0
     doubt = f" ({days:.3g} days: are the times in ms?)" if days > LONG_DAYS else ""
-    lines = [
-        f"{found.path}: {found.rows} rows in {found.seconds:g} s{doubt}, {found.measured} with a "
-        "measured value"
-    ]
+    rows = f"{found.rows} rows in {found.seconds:g} s{doubt}"
+    lines = [f"{found.recording}: {rows}, {found.measured} with a measured value"]
     for what, names in (
         ("temperatures of", found.temperatures),
         ("covariates", found.covariates),
@@ -90,13 +88,4 @@ def _run(arguments: argparse.Namespace) -> int:
         lines += [f"  {what} {', '.join(names)}"] if names else []
     if found.cut_row:
         lines.append(f"  row {found.cut_row}, the last one, is cut and left out")
-    values = {
-        "recording": str(found.path),
-        "rows": found.rows,
-        "measured": found.measured,
-        "seconds": found.seconds,
-        "temperatures": found.temperatures,
-        "covariates": found.covariates,
-        "cut_row": found.cut_row,
-    }
-    return say(arguments, lines, values)
+    return say(arguments, lines, {**asdict(found), "recording": str(found.recording)})

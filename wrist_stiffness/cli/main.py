@@ -9,8 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
-from types import FrameType
-from typing import Protocol
+from types import FrameType, ModuleType
 
 from wrist_stiffness import __version__
 from wrist_stiffness.atomic_file import require_room
@@ -36,7 +35,6 @@ from wrist_stiffness.cli.parser import (
     EXIT_INTERRUPTED,
     EXIT_PIPE_CLOSED,
     PROG,
-    Commands,
     OneLineParser,
 )
 from wrist_stiffness.cli.progress import bars_ended
@@ -76,19 +74,7 @@ PLACES = ("output", "record", "diagnosis", *RESULTS)
 """Options that name what is written, or a result that is read: each needs a place of its own."""
 
 
-class CommandModule(Protocol):
-    """What a module of this folder offers to become a command.
-
-    `add_parser` adds its parser and names the function to run with
-    `parser.set_defaults(run=run)`; `run(arguments)` returns an exit code.  `run` imports the
-    workflow it needs, so that `--help` and the other commands do not wait for it.
-    """
-
-    def add_parser(self, commands: Commands) -> None:
-        """Add this command's parser."""
-
-
-COMMANDS: tuple[CommandModule, ...] = (
+COMMANDS: tuple[ModuleType, ...] = (
     table,
     predict,
     explain,
@@ -105,14 +91,12 @@ COMMANDS: tuple[CommandModule, ...] = (
     workbench,
     cell,
 )
+"""`add_parser` of each adds its parser and the function to run, which returns an exit code and
+imports what it needs, so that `--help` and the other commands do not wait for it."""
 
 
-def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:
-    """Return the parser of all commands.
-
-    `commands`: modules in the order in which the help lists them.  Gives `OneLineParser`: its
-    result has the attribute `run`, a function of the parsed arguments.
-    """
+def build_parser(commands: Iterable[ModuleType]) -> OneLineParser:
+    """Return the parser of commands, listed in their order; its result has a function `run`."""
     parser = OneLineParser(
         prog=PROG,
         description=DESCRIPTION,
@@ -132,7 +116,7 @@ def build_parser(commands: Iterable[CommandModule]) -> OneLineParser:
     return parser
 
 
-def main(argv: Sequence[str] | None = None, commands: Iterable[CommandModule] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, commands: Iterable[ModuleType] | None = None) -> int:
     """Run one command.
 
     `argv`: arguments without the program name; those of the process if None.  `commands`: the

@@ -33,10 +33,7 @@ def model_named(arguments: argparse.Namespace) -> Path:
 
 
 def table_named(arguments: argparse.Namespace) -> Table:
-    """Return the lookup table that is named, or the shipped one.
-
-    Raises `WristError` if it cannot be read.
-    """
+    """Return the lookup table that is named, or the shipped one (WristError if unreadable)."""
     from wrist_stiffness.lookup.table_file import load_table
 
     return load_table(arguments.table or shipped_file("precomputed/palmieri2015.npz"))
@@ -55,10 +52,7 @@ def add_load(parser: OneLineParser) -> None:
 
 
 def whole_load(numbers: list[float]) -> list[float]:
-    """Return a force and a moment from what `--load` was given.
-
-    Raises `InputError` if there are neither 3 nor 6 numbers.
-    """
+    """Return force and moment of `--load`, 6 numbers (InputError if there are not 3 or 6)."""
     if len(numbers) not in (3, 6):
         raise InputError(f"--load takes 3 or 6 numbers, not {len(numbers)}")
     return [*numbers, *[0.0] * (6 - len(numbers))]
@@ -87,10 +81,7 @@ def add_sensor_names(
 
 
 def recordings_named(paths: list[str], arguments: argparse.Namespace) -> Recordings:
-    """Return the recordings of a command with those options.
-
-    Raises `InputError` if an option cannot be read.
-    """
+    """Return the recordings of a command with those options (InputError if one is wrong)."""
     from wrist_stiffness.commands.read_sessions import Recordings
     from wrist_stiffness.topics import parse_topic_remaps
 
@@ -99,10 +90,7 @@ def recordings_named(paths: list[str], arguments: argparse.Namespace) -> Recordi
 
 
 def settings_named(arguments: argparse.Namespace) -> tuple[StreamSettings, StreamSettings]:
-    """Return the settings of predictor and corrector by those options.
-
-    Raises `InputError` if an option cannot be read.
-    """
+    """Return the settings of predictor and corrector by those options (InputError, likewise)."""
     from wrist_stiffness.commands.parameter_file import node_settings
 
     if len(arguments.joint) not in (0, 2):
@@ -122,10 +110,7 @@ def add_compared_recordings(parser: OneLineParser) -> None:
 
 
 def for_each(arguments: argparse.Namespace) -> bool:
-    """Tell whether every recording is taken by itself.
-
-    Raises `InputError` if another option does not go with that.
-    """
+    """Tell whether every recording is taken by itself (InputError beside `--report`)."""
     if arguments.each and arguments.report:
         raise InputError("--report draws one wrist; leave out --each")
     return bool(arguments.each)

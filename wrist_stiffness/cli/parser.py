@@ -1,11 +1,22 @@
-"""What every command of `wrist-stiffness` shares: its name, exit codes and one-line errors."""
+"""What every command of `wrist-stiffness` shares: name, exit codes, one-line errors, its answer."""
+
+from __future__ import annotations
 
 import argparse
+import json
 import re
+import shlex
+import sys
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NoReturn, TypeAlias
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
+from wrist_stiffness.atomic_file import writing
 from wrist_stiffness.errors import InputError, meant, with_a_point
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.provenance import Run
 
 PROG = "wrist-stiffness"
 
@@ -124,10 +135,7 @@ def add_command(
 
 
 def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:
-    """Return the numbers of an option that takes NAME=NUMBER, by their names.
-
-    Raises `InputError` if a text is no such pair, or a name comes twice.
-    """
+    """Return the numbers of NAME=NUMBER options by name (InputError for others, or twice)."""
     values: dict[str, float] = {}
     for text in texts:
         name, _, number = text.partition("=")
@@ -142,3 +150,25 @@ def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:
             raise InputError(f"{option} {text}: {name} is {values[name]:g} already")
         values[name] = value
     return values
+
+
+def say(arguments: argparse.Namespace, lines: Iterable[str], values: Any) -> int:
+    """Print the answer, write it where `--json` asks for that, and return the exit code."""
+    print("\n".join(lines))
+    if arguments.json:
+        write_json(arguments.json, values)
+    return EXIT_DONE
+
+
+def write_json(path: str | Path, content: Any) -> None:
+    """Write a result for programs, complete or not at all (InputError if that fails)."""
+    with writing(path) as written:
+        written.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def this_run() -> Run:
+    """Return the command of this process and the time."""
+    from wrist_stiffness.commands.provenance import Run
+
+    command = shlex.join([PROG, *sys.argv[1:]])
+    return Run(command, datetime.now(UTC).isoformat(timespec="seconds"))

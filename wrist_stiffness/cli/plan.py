@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.options import (
-    add_model,
-    add_sensor_names,
-    model_named,
-    recordings_named,
-)
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
+from wrist_stiffness.cli.options import add_model, add_sensor_names, model_named, recordings_named
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command, say
 from wrist_stiffness.errors import InputError
 
 DESCRIPTION = """\
@@ -74,8 +68,7 @@ def add_parser(commands: Commands) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.commands.plan import Options, plan_experiment
-    from wrist_stiffness.report.plan_folder import require_new_folder, write_plan
-    from wrist_stiffness.report.plan_summary import plan_summary
+    from wrist_stiffness.report.plan import plan_summary, require_new_folder, write_plan
 
     require_new_folder(arguments.output)
     options = Options(
@@ -100,7 +93,7 @@ def _run(arguments: argparse.Namespace) -> int:
         recordings,
         Progress("plan"),
     )
-    text = plan_summary(planned)
+    text = plan_summary(planned.plan, arguments.commissioning)
     say(arguments, [text], planned.as_values())
     timeline = planned.plan.timeline
     if timeline is None:

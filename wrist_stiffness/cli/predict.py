@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wrist_stiffness.cli.options import add_pose, model_named, whole_load
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say
 
 DESCRIPTION = """\
 Predict how far the platform is off at given motor angles under a given load, own weight included:

@@ -6,14 +6,8 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from wrist_stiffness.cli.options import (
-    add_model,
-    add_sensor_names,
-    model_named,
-    settings_named,
-)
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
+from wrist_stiffness.cli.options import add_model, add_sensor_names, model_named, settings_named
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command, say
 from wrist_stiffness.errors import InputError
 
 DESCRIPTION = """\

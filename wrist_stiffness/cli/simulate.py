@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict, replace
 from math import pi
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.options import table_named
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command
+from wrist_stiffness.cli.parser import Commands, add_command, say
 from wrist_stiffness.errors import InputError
 
 if TYPE_CHECKING:
@@ -85,8 +85,8 @@ def _run(arguments: argparse.Namespace) -> int:
         DAY_SEEDS,
         check_bounds,
         hide,
-        hide_blind,
         on_day,
+        secret,
         simulate_recording,
     )
     from wrist_stiffness.recording import RecordingWriter
@@ -110,7 +110,8 @@ def _run(arguments: argparse.Namespace) -> int:
     RecordingWriter(arguments.output, overwrite=arguments.overwrite).check_target()
     with Status() as status:
         if arguments.blind is not None:
-            settings = hide_blind(arguments.blind, table, settings, arguments.seconds, status)
+            drawn = secret(arguments.blind, table, settings, arguments.seconds, status)
+            settings = replace(settings, hidden=(drawn.hidden,))
         elif arguments.effect is not None:
             size = USUAL_SIZE if arguments.size is None else arguments.size
             settings = hide(arguments.effect, size, table, settings, arguments.seconds, status)
@@ -123,13 +124,8 @@ def _run(arguments: argparse.Namespace) -> int:
         Progress("samples"),
         arguments.overwrite,
     )
-    values = {
-        "recording": str(written.path),
-        "samples": written.samples,
-        "seconds": written.seconds,
-    }
-    lines = [f"{written.path}: {written.samples} samples, {written.seconds:g} s"]
-    return say(arguments, lines, values)
+    lines = [f"{written.recording}: {written.samples} samples, {written.seconds:g} s"]
+    return say(arguments, lines, {**asdict(written), "recording": str(written.recording)})
 
 
 def _settings(arguments: argparse.Namespace) -> CellSettings:
@@ -150,8 +146,6 @@ def _settings(arguments: argparse.Namespace) -> CellSettings:
 
 
 def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings) -> int:
-    from dataclasses import asdict
-
     from wrist_stiffness.cli.progress import Status
     from wrist_stiffness.commands.simulate import secret
     from wrist_stiffness.simulation.catalogue import ALL

@@ -7,8 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from wrist_stiffness.cli.options import table_named, whole_load
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command, say
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015.yaml")
@@ -192,8 +191,8 @@ def _check(arguments: argparse.Namespace) -> int:
 def _show(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands import modes, table
     from wrist_stiffness.commands.budget import Push
+    from wrist_stiffness.report.pictures.table import draw_maps, draw_modes
     from wrist_stiffness.report.table_lines import fact_lines, load_lines, mode_lines
-    from wrist_stiffness.report.table_pictures import draw_maps, draw_modes
 
     shown = table_named(arguments)
     values: Any
@@ -208,7 +207,7 @@ def _show(arguments: argparse.Namespace) -> int:
         if arguments.load is not None:
             push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
         pictures = draw_maps(shown, arguments.output, push)
-        summary = table.summarise(shown)
-        lines, values = [*fact_lines(shown), *load_lines(summary)], asdict(summary)
+        values = table.summarise(shown)
+        lines = [*fact_lines(shown), *load_lines(values)]
     lines += [f"written: {picture}" for picture in pictures]
     return say(arguments, lines, values)

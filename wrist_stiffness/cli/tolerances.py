@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 
 from wrist_stiffness.cli.options import add_load, add_model, model_named, whole_load
-from wrist_stiffness.cli.output import say
-from wrist_stiffness.cli.parser import Commands, add_command, named_numbers
+from wrist_stiffness.cli.parser import Commands, add_command, named_numbers, say
 
 DESCRIPTION = """\
 Say which tolerance costs how many um.  Virtual wrists are built, every axis, gap and part drawn

@@ -31,15 +31,13 @@ def add_parser(commands: Commands) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.web.server import Served, serve
+    from wrist_stiffness.web.server import serve
 
     serve(
-        Served(
-            arguments.folder,
-            arguments.host,
-            arguments.port,
-            arguments.largest_upload,
-            not arguments.no_browser,
-        )
+        arguments.folder,
+        arguments.host,
+        arguments.port,
+        arguments.largest_upload,
+        not arguments.no_browser,
     )
     return EXIT_DONE

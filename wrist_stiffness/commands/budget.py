@@ -13,6 +13,7 @@ from wrist_stiffness.lookup.rated_load import RATED_FORCE
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.energy import strain_energies
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.mechanism.vectors import cross
@@ -84,13 +85,17 @@ def budget(table: Table, push: Push, per_axis: int = PER_AXIS) -> Budget:
     wrench = push.wrench(configuration.platform)
     for each in np.reshape(wrench, (-1, 6)):
         table.check_load(each)
+    twist, shares = load_alone(table, configuration, wrench)
+    return Budget(theta, table.workspace.operative(theta), twist, shares)
+
+
+def load_alone(table: Table, configuration: Configuration, wrench: Array) -> tuple[Array, Array]:
+    """Return twists (..., 6) and energy shares (..., 8) of wrenches (..., 6) without own weight.
+
+    Without a load all shares are 0.
+    """
     operators = contact_operators(configuration, table.components, np.zeros(3))
     response = respond(operators, wrench)
     energy = strain_energies(configuration, table.components, wrench, response.force)
     total = energy.sum(axis=-1, keepdims=True)
-    return Budget(
-        theta=theta,
-        operative=table.workspace.operative(theta),
-        twist=response.twist,
-        shares=energy / np.where(total > 0.0, total, 1.0),
-    )
+    return response.twist, energy / np.where(total > 0.0, total, 1.0)

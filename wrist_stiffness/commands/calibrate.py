@@ -9,18 +9,12 @@ from typing import Any
 from wrist_stiffness.atomic_file import require_room
 from wrist_stiffness.commands.fit_values import fit_values, parameter_values
 from wrist_stiffness.commands.provenance import Run
-from wrist_stiffness.commands.read_sessions import (
-    Recordings,
-    read_sessions,
-    was_fitted_to,
-)
-from wrist_stiffness.comparing.compare import suspicion_in
+from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
+from wrist_stiffness.comparing.compare import doubts_load, suspicion_in, wrong_load
 from wrist_stiffness.comparing.wiring import told_mistake
-from wrist_stiffness.comparing.wrong_load import doubts_load, wrong_load
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate
 from wrist_stiffness.identification.free_effects import unfitted
-from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -32,7 +26,6 @@ class Calibrated:
 
     calibration: Calibration
     sessions: tuple[MeasuredSession, ...]  # what was measured, in the order of time
-    output: Path
     mistake: str  # of signs, units or names, where one explains most of what is left; else empty
 
     def as_values(self) -> dict[str, Any]:
@@ -65,27 +58,19 @@ def calibrate_model(
     sessions = read_sessions(recordings, [parent], progress)
     step = run.step(model, sessions)
     again = was_fitted_to(parent, sessions)
-    found = calibrate(parent, tuple(sessions.values()), progress, again)
+    measured = tuple(sessions.values())
+    found = calibrate(parent, measured, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
-    calibrated = Calibrated(found, tuple(sessions.values()), output, "")
     start = unfitted(parent) if again else parent
-    calibrated = replace(calibrated, mistake=_mistake(start, child, calibrated, asking))
-    save_model(child, output)
-    return calibrated
-
-
-def _mistake(start: ErrorModel, child: ErrorModel, calibrated: Calibrated, asking: Progress) -> str:
-    """Return the mistake of signs, units or names that explains most of what a fit leaves or bent.
-
-    What is wrong with positions or angles shows in the model as it was; what is wrong with the load
-    hides there behind axes that are a little off their drawing.
-    """
-    sessions, mistake, much = calibrated.sessions, "", calibrated.calibration.fit.rough
+    mistake, much = "", found.fit.rough
+    # What is wrong with positions or angles shows in the model as it was; what is wrong with the
+    # load hides there behind axes that are a little off their drawing.
     if much:
-        mistake = told_mistake(suspicion_in(start, sessions))
-    if not mistake and (much or doubts_load(calibrated.calibration)):
-        mistake = wrong_load(start, child, sessions, calibrated.calibration, asking)
-    return mistake
+        mistake = told_mistake(suspicion_in(start, measured))
+    if not mistake and (much or doubts_load(found)):
+        mistake = wrong_load(start, child, measured, found, asking)
+    save_model(child, output)
+    return Calibrated(found, measured, mistake)
 
 
 def writable(output: str | Path) -> Path:

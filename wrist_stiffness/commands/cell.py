@@ -72,40 +72,18 @@ def run_cell(
 ) -> bool:
     """Run predictor, corrector and virtual cell until the motion is over; in the main thread.
 
-    The same motion runs twice, first with the corrector off and then with it on, so that before
-    and after can be compared; the notes in the recording say where the second one begins.
+    The same motion runs twice, first with the corrector off and then with it on, so that before and
+    after can be compared; the notes in the recording say where the second one begins.
 
-    Parameters
-    ----------
-    model : path, optional
-        Model file of nodes and cell; the shipped one if None.
-    seconds : float, optional
-        About how long both runs of the motion take together [s]; without it the motion goes on,
-        uncorrected, until the process is interrupted.
-    record : path, optional
-        Recording to write, as a rosbag2 folder or a `.mcap` file.
-    rate_hz : float
-        Samples per second.
-    seed : int
-        Of the motion and of the sensors' noise.
-    progress : callable
-        Called with seconds done and in all.
-    tell : callable
-        Called with a line for every node that had to be killed in the end.
-    experiment : str
-        What the motion is, one of `simulation.experiment.EXPERIMENTS`.
-
-    Returns
-    -------
-    bool
-        Whether all nodes answered all along and ended when they were told to; the virtual cell
-        itself says on stderr which one fell silent.
-
-    Raises
-    ------
-    WristError
-        If a number, the model or the recording's place cannot be used, a node ends with an error,
-        the run does not end in time, or the recording is not complete.
+    `model`: of nodes and cell; the shipped one if None; `seconds`: about how long both runs of the
+    motion take together [s]; without it the motion goes on, uncorrected, until the process is
+    interrupted; `record`: rosbag2 folder or `.mcap` file to write; `rate_hz`: samples per second;
+    `seed`: of the motion and of the sensors' noise; `progress`: called with seconds done and in
+    all; `tell`: called with a line for every node that had to be killed in the end; `experiment`:
+    one of `simulation.experiment.EXPERIMENTS`.  Gives whether all nodes answered all along and
+    ended when they were told to; the virtual cell itself says on stderr which one fell silent.
+    Raises `WristError` if a number, the model or the recording's place cannot be used, a node ends
+    with an error, the run does not end in time, or the recording is not complete.
     """
     if find_spec("rclpy") is None:
         raise InputError("cell: ROS 2 (rclpy) is not installed; pip install 'wrist_stiffness[ros]'")
@@ -145,10 +123,7 @@ def run_cell(
 
 
 def check_numbers(seconds: float | None, rate_hz: float = 100.0, seed: int = 0) -> None:
-    """Refuse numbers with which no run can be, before any node is started.
-
-    Raises `InputError` with the limits.
-    """
+    """Refuse numbers with which no run can be, before any node is started (InputError)."""
     if seconds is not None and not SHORTEST_S <= seconds <= LONGEST_S:
         raise InputError(f"seconds: {seconds:g} is not {SHORTEST_S:g} to {LONGEST_S:g}")
     if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:

@@ -17,9 +17,8 @@ from wrist_stiffness.commands.read_sessions import (
     was_fitted_to,
 )
 from wrist_stiffness.comparing.compare import compare_models
-from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
+from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, WorstPose, worst_poses
 from wrist_stiffness.comparing.wiring import WORTH_ASKING
-from wrist_stiffness.comparing.worst_poses import WorstPose, worst_poses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
@@ -92,8 +91,8 @@ def compare(
     """Compare models with recordings of one wrist.
 
     `models`: model files, the one to be improved upon first; `progress`: from a label to a function
-    that is told steps done and in all.  Gives `Compared`: errors, on what they depend, worst poses.
-    Raises `WristError` if a model or a recording cannot be used.
+    that is told steps done and in all.  Raises `WristError` if a model or a recording cannot be
+    used.
     """
     names = unique_names(models)
     loaded = [(name, load_model(path)) for name, path in zip(names, models, strict=True)]

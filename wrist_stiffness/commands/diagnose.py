@@ -17,10 +17,9 @@ from wrist_stiffness.commands.read_sessions import (
     sha256_by_name,
     was_fitted_to,
 )
-from wrist_stiffness.comparing.compare import suspicion_in
+from wrist_stiffness.comparing.compare import suspicion_in, wrong_load
 from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.wiring import WORTH_ASKING, told_mistake
-from wrist_stiffness.comparing.wrong_load import wrong_load
 from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
@@ -136,8 +135,8 @@ def mistake_beside(
     tell: Callable[[str], None] = lambda text: None,
 ) -> str:
     """Return the mistake of signs, units or names that an answer makes likely; empty for none."""
-    mistake = ""
-    if _leaves_much(answer.diagnosis):
+    mistake, noise = "", answer.diagnosis.noise
+    if any(size > WORTH_ASKING * noise[key] for key, size in answer.diagnosis.after.items()):
         tell("asking for wrong signs, units and names")
         mistake = told_mistake(suspicion_in(known, sessions))
     if not mistake and _doubts_load(answer):
@@ -147,12 +146,6 @@ def mistake_beside(
         fitted = known.with_effects(*answer.fitted.effects(0))
         mistake = wrong_load(known, fitted, sessions)
     return mistake
-
-
-def _leaves_much(result: Diagnosis) -> bool:
-    """Tell whether so much is left that a mistake of the set-up is looked for."""
-    noise = result.noise
-    return any(error > WORTH_ASKING * noise[key] for key, error in result.after.items())
 
 
 def _doubts_load(answer: WristDiagnosis) -> bool:

@@ -97,26 +97,10 @@ def explain(
 ) -> Explanation:
     """Split the pose error at one pose by component and by effect.
 
-    Parameters
-    ----------
-    angles : sequence of 2 float
-        Motor angles [rad].
-    load : Load
-        Wrench on the platform at O.
-    measured : sequence of 7 float, optional
-        Measured pose of the platform: its point O in F [m], quaternion x, y, z, w of U -> F.
-    temperatures, covariates : dict of str to float, optional
-        Further signals; temperatures by component or `ambient` [degC].
-
-    Returns
-    -------
-    Explanation
-        Rows that add up, largest first within their kind.
-
-    Raises
-    ------
-    WristError
-        If the model cannot be read, or a value is out of range.
+    `angles`: motor angles [rad]; `load`: wrench on the platform at O; `measured` (7 numbers):
+    measured pose of the platform, its point O in F [m] and quaternion x, y, z, w of U -> F;
+    `temperatures`: by component or `ambient` [degC].  Gives rows that add up, largest first within
+    their kind.  Raises `WristError` if the model cannot be read, or a value is out of range.
     """
     for name in temperatures or {}:
         if name not in THERMOMETERS:

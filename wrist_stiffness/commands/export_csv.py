@@ -21,6 +21,7 @@ from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import Samples
+from wrist_stiffness.sessions.in_pieces import rigid_rotation
 from wrist_stiffness.sessions.reading.csv_columns import (
     LOAD,
     MOTORS,
@@ -44,7 +45,6 @@ from wrist_stiffness.sessions.reading.refusals import require_topics
 from wrist_stiffness.sessions.reading.session import notes_of, path_stamps
 from wrist_stiffness.sessions.reading.signals import Stamps
 from wrist_stiffness.sessions.reading.static_frames import frames_of
-from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
 from wrist_stiffness.topics import MOTOR_COMMANDS
 
 ROWS_A_REPORT = 1000
@@ -57,7 +57,7 @@ LONGEST_HEAD = 100_000
 class Exported:
     """What was written."""
 
-    path: Path  # the table
+    table: Path
     rows: int  # measured poses in it
     # rows without a measured value: where the wrist or its load turned back between poses
     turns: int
@@ -80,31 +80,11 @@ def export_csv(
     to the bit.  Nothing is taken for an outlier and no clock is put right.  Where poses are far
     apart, rows without a measured value tell the way that friction and play remember.
 
-    Parameters
-    ----------
-    recording : path
-        rosbag2 folder with MCAP storage, or `.mcap` file.
-    table : Table
-        Of the wrist: turns loads that are measured on the platform into F, and knows how small a
-        swing of a motor is the chatter of a count.
-    remaps : mapping, optional
-        Actual by standard topic name.
-    settings : StreamSettings, optional
-        Joint names, sensor frames and age limit of loads.
-    progress : callable
-        Told rows done and in all.
-
-    Returns
-    -------
-    Exported
-        Counts.
-
-    Raises
-    ------
-    InputError
-        If the output exists, is no table, or cannot be written.
-    WristError
-        If the recording cannot be read, lacks a topic or has a frame that is not known.
+    `table`: of the wrist: turns loads that are measured on the platform into F, and knows how small
+    a swing of a motor is the chatter of a count; `remaps`: actual by standard topic name;
+    `settings`: joint names, sensor frames and age limit of loads; `progress`: told rows done and in
+    all.  Raises `InputError` if the output exists, is no table, or cannot be written; `WristError`
+    if the recording cannot be read, lacks a topic or has a frame that is not known.
     """
     settings = settings or StreamSettings()
     output = Path(output)
@@ -116,7 +96,7 @@ def export_csv(
     notes, _ = notes_of(samples)
     known = frames_of(source, remaps or {}, settings.frames)
     try:
-        machine = machine_signals(samples, known.frames)
+        machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
             time_ns, measured, names, markers = _measured(samples, known.frames)
             gauges: tuple[str, ...] = ()
@@ -126,12 +106,12 @@ def export_csv(
             gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in track.gauges)
     except FrameError as error:
         raise FrameError("; ".join([f"{source.path}: {error}", *known.hints])) from error
-    usable, unknown = machine.usable(time_ns, settings.load_age_limit_s)
+    usable, unknown = machine.usable(time_ns)
     remarks = (*known.remarks, *unknown)
     if not usable.any():
         raise InputError(f"{source.path}: no measured pose can be used: {'; '.join(remarks)}")
     pose_ns = time_ns[usable]
-    way_ns = path_stamps(machine, pose_ns, table, settings.load_age_limit_s)
+    way_ns = path_stamps(machine, pose_ns, table)
     time_ns = np.union1d(pose_ns, way_ns)
     seen = np.full((len(time_ns), measured.shape[1]), np.nan)
     seen[np.searchsorted(time_ns, pose_ns)] = measured[usable]

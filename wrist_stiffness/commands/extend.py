@@ -78,24 +78,12 @@ def own_effect(name: str) -> Effect:
 
 
 def direction_of(words: Sequence[str]) -> list[float]:
-    """Return the screw that a user names: six numbers, or in the words of `compare`.
+    """Return the screw that a user names, translation [m] and rotation [rad] for a value of 1.
 
-    Parameters
-    ----------
-    words : sequence of str
-        Six numbers; or "along" (a shift) or "about" (a turn) with an axis such as "+z" or three
-        numbers such as "(-0.38, -0.88, 0.29)", of which only the direction counts: `compare`
-        rounds them, and a parameter in um should be the way in um.
-
-    Returns
-    -------
-    list of 6 float
-        Translation [m], rotation [rad], for a value of 1; of length 1 where words named it.
-
-    Raises
-    ------
-    InputError
-        If it is neither, or the three numbers are no direction.
+    `words`: six numbers; or "along" (a shift) or "about" (a turn) with an axis such as "+z" or
+    three numbers such as "(-0.38, -0.88, 0.29)", of which only the direction counts: `compare`
+    rounds them, and a parameter in um should be the way in um.  Raises `InputError` if it is
+    neither, or the three numbers are no direction.
     """
     text = " ".join(words)
     kind, *rest = re.sub(r"[(),]", " ", text).split() or [""]

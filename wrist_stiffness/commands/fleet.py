@@ -6,7 +6,7 @@ For a command that takes a folder of recordings, each of a wrist of its own::
         session = read_session(path, load_model(model).table)
         return {"poses": len(session)}
 
-    rows = map_recordings(partial(summary, model="wrist.yaml"), recordings_in([folder]), ...)
+    rows = spread(partial(summary, model="wrist.yaml"), recordings_in([folder]))
 
 Workers are processes of their own: function and result are pickled, so the function is one of a
 module and everything else reaches it by `functools.partial`.
@@ -18,14 +18,14 @@ import os
 import pickle
 import signal
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import WristError
@@ -44,33 +44,24 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 SPAWN = get_context("spawn")
 
 
-class Answer(NamedTuple, Generic[Result]):
-    """What a function returned, None where it failed, and why it did, in one line."""
+class Answer(NamedTuple, Generic[Item, Result]):
+    """What a function made of one item."""
 
-    result: Result | None
-    error: str
-
-
-@dataclass(frozen=True)
-class FleetRow(Generic[Result]):
-    """What one recording gave."""
-
-    path: Path
-    result: Result | None  # what the function returned; None where it failed
+    item: Item
+    result: Result | None  # what it returned; None where it failed
     error: str = ""  # why it failed, one line; empty where it did not
 
-    @property
-    def reason(self) -> str:
-        """The error without the path, which a table has before it."""
-        return self.error.removeprefix(f"{self.path}: ").removeprefix(f"{self.path} ")
+
+Row: TypeAlias = "Answer[Path, dict[str, Any]]"
+"""What a command gives a program of one recording."""
 
 
-def table_values(rows: Sequence[FleetRow[dict[str, Any]]], what: str) -> dict[str, Any]:
+def table_values(rows: Sequence[Row], what: str) -> dict[str, Any]:
     """Return what programs read of rows: under this name each result, or None and the error."""
     return {
         "schema": 1,
         "recordings": [
-            {"recording": str(row.path), "error": row.error or None, what: row.result}
+            {"recording": str(row.item), "error": row.error or None, what: row.result}
             for row in rows
         ],
     }
@@ -84,18 +75,14 @@ class Told(Protocol):
 
 
 def each_recording(
-    command: Callable[[Recordings], Told],
-    recordings: Recordings,
-    progress: Progress,
-) -> list[FleetRow[dict[str, Any]]]:
+    command: Callable[[Recordings], Told], recordings: Recordings, progress: Progress
+) -> list[Row]:
     """Run a command on every recording by itself, as of a wrist of its own, in parallel.
 
-    `command`: of recordings; can be pickled.  `progress`: as that of `map_recordings`.  Gives with
-    what the command gives for a program.  Raises `InputError` if there is no recording.
+    `command`: of recordings; can be pickled.  Raises `InputError` if there is no recording.
     """
     one = partial(_values, command=command, recordings=recordings)
-    paths = recordings_in(recordings.paths)
-    return map_recordings(one, paths, progress=progress)
+    return spread(one, recordings_in(recordings.paths), progress=progress)
 
 
 def _values(
@@ -104,40 +91,23 @@ def _values(
     return command(replace(recordings, paths=[path])).as_values()
 
 
-def map_recordings(
-    function: Callable[[Path], Result],
-    paths: Sequence[Path],
-    workers: int | None = None,
-    progress: Progress = silent,
-) -> list[FleetRow[Result]]:
-    """Call a function of one recording for each of many.
-
-    `function`: of a path; can be pickled.  `paths`: recordings (see
-    `sessions.reading.folder.recordings_in`).  `workers`: processes; one for each processor, at most
-    one for each recording, if None.  `progress`: told recordings done and in all.  Gives in the
-    order of the paths.  A recording that fails is a row with its error, not a stop.
-    """
-    answers = spread(function, paths, workers, progress)
-    return [FleetRow(path, *answer) for path, answer in zip(paths, answers, strict=True)]
-
-
 def spread(
     function: Callable[[Item], Result],
     items: Sequence[Item],
     workers: int | None = None,
     progress: Progress = silent,
-) -> list[Answer[Result]]:
-    """Call a function of one item for each of many, as `map_recordings` does for paths.
+) -> list[Answer[Item, Result]]:
+    """Call a function of one item for each of many, in their order, on several processes.
 
-    A worker that dies loses nothing: what it had in hand goes to another one, up to three times.
-
-    Gives in the order of the items.
+    `function`: can be pickled.  `workers`: processes; one for each processor, at most one for each
+    item, if None.  An item that fails is an answer with its error, not a stop.  A worker that dies
+    loses nothing: what it had in hand goes to another one, up to three times.
     """
     if len(items) <= 1:
         return [attempt(function, item) for item in items]
     # As bytes: a worker that cannot load the function says so instead of dying over it.
     pickled = pickle.dumps(function)
-    answers: dict[int, Answer[Result]] = {}
+    answers: dict[int, Answer[Item, Result]] = {}
     waiting = list(reversed(range(len(items))))
     deaths = Counter[int]()
     in_hand: dict[_Worker, int] = {}
@@ -149,7 +119,9 @@ def spread(
                 if waiting and worker not in in_hand:
                     in_hand[worker] = waiting.pop()
                     worker.ask(items[in_hand[worker]])
-            for worker in _answered(in_hand):
+            ready = wait([worker.pipe for worker in in_hand])
+            # They have answered or died.
+            for worker in [each for each in in_hand if each.pipe in ready]:
                 i = in_hand.pop(worker)
                 try:
                     answers[i] = worker.pipe.recv()
@@ -160,7 +132,7 @@ def spread(
                     if deaths[i] < ATTEMPTS:
                         waiting.append(i)
                         continue
-                    answers[i] = Answer(None, died)
+                    answers[i] = Answer(items[i], None, died)
                 progress(len(answers), len(items))
     finally:
         for worker in crew:
@@ -168,15 +140,15 @@ def spread(
     return [answers[i] for i in range(len(items))]
 
 
-def attempt(function: Callable[[Item], Result], item: Item) -> Answer[Result]:
+def attempt(function: Callable[[Item], Result], item: Item) -> Answer[Item, Result]:
     """Call a function of one item; whatever goes wrong becomes the answer's error."""
     try:
-        return Answer(function(item), "")
+        return Answer(item, function(item))
     except WristError as error:
-        return Answer(None, " ".join(str(error).split()))
+        return Answer(item, None, " ".join(str(error).split()))
     except Exception as error:
         # A fault of one wrist's code path must not take the rest of the fleet's table with it.
-        return Answer(None, f"{type(error).__name__}: {' '.join(str(error).split())}")
+        return Answer(item, None, f"{type(error).__name__}: {' '.join(str(error).split())}")
 
 
 class _Worker:
@@ -200,12 +172,6 @@ class _Worker:
         self._process.join()
         self.pipe.close()
         return self._process.exitcode
-
-
-def _answered(workers: Collection[_Worker]) -> list[_Worker]:
-    """Return those that have answered or died; wait for one."""
-    ready = wait([worker.pipe for worker in workers])
-    return [worker for worker in workers if worker.pipe in ready]
 
 
 def _serve(pickled: bytes, pipe: Connection) -> None:

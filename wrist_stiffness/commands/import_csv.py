@@ -52,7 +52,7 @@ from wrist_stiffness.sessions.reading.csv_columns import (
 )
 from wrist_stiffness.sessions.reading.gauge_readings import GAUGES
 from wrist_stiffness.sessions.reading.gauges_file import gauge_of, read_gauges
-from wrist_stiffness.sessions.reading.marker_poses import LEAST_MARKERS
+from wrist_stiffness.sessions.reading.pose_track import LEAST_MARKERS
 from wrist_stiffness.topics import BASE_FRAME
 
 NAN = float("nan")
@@ -81,7 +81,7 @@ LONGEST_LINE = csv.field_size_limit()
 class Imported:
     """What was written."""
 
-    path: Path
+    recording: Path
     # `rows`, `measured`: rows of the table; those in which something was measured
     rows: int
     measured: int
@@ -103,31 +103,13 @@ def import_csv(
 ) -> Imported:
     """Write a table of measured poses as a recording.
 
-    Parameters
-    ----------
-    table : path
-        CSV file; its columns are those of `sessions.reading.csv_columns`.
-    output : path
-        rosbag2 folder, or file where it ends in `.mcap`.
-    unloaded : bool
-        The table has no load columns because nothing pulled at the platform.
-    progress : callable
-        Told rows done and in all.
-    gauges_file : path, optional
-        Which columns are dial gauges and inclinometers, and where these stand.
-
-    Returns
-    -------
-    Imported
-        Counts.
-
-    Raises
-    ------
-    InputError
-        If a column is missing or unknown, or a cell cannot be used; with its row (the first line
-        of the file is row 1) and column.
-    RecordingError
-        If the recording exists or cannot be written; then nothing is written.
+    `table`: CSV file with the columns of `sessions.reading.csv_columns`; `output`: rosbag2 folder,
+    or file where it ends in `.mcap`; `unloaded`: whether load columns are missing because nothing
+    pulled at the platform; `progress`: told rows done and in all; `gauges_file`: which columns are
+    dial gauges and inclinometers, and where these stand.  Raises `InputError` if a column is
+    missing or unknown, or a cell cannot be used, with its row (the first line of the file is row 1)
+    and column; `RecordingError` if the recording exists or cannot be written.  Then nothing is
+    written.
     """
     table = Path(table)
     form = _survey(table)

@@ -60,14 +60,13 @@ class ModeMap:
         return self.frequency[state][table.workspace.operative(self.poses)]
 
 
-def mode_map(table: Table, payload: RigidBody | None = None, per_axis: int = PER_AXIS) -> ModeMap:
+def mode_map(table: Table, payload: RigidBody | None = None) -> ModeMap:
     """Solve for the natural modes on a grid over the map domain.
 
-    `table`: with masses; `payload`: what the platform carries; `per_axis`: grid points along each
-    motor angle.  Raises `TableError` if the table is of an older version and holds no masses;
-    `LoadRangeError` if the payload weighs more than the table's range.
+    Raises `TableError` if the table is of an older version and holds no masses; `LoadRangeError` if
+    the payload weighs more than the table's range.
     """
-    poses = table.workspace.rectangle_grid(per_axis)
+    poses = table.workspace.rectangle_grid(PER_AXIS)
     inside = table.workspace.domain(poses)
     configuration = table.mechanism.forward(poses[inside])
     found = {}

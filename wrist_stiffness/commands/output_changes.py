@@ -168,26 +168,28 @@ def _sizes(old: Message, new: Message) -> Iterable[tuple[str, float]]:
         # Unit quaternions differ by half the angle between them, to second order.
         apart = min(np.linalg.norm(turns[1] - turns[0]), np.linalg.norm(turns[1] + turns[0]))
         yield TURN, MILLIDEGREES * 2.0 * float(apart)
-        first, second = (np.reshape(m.pose.covariance, (6, 6)) for m in (old, new))
-        scale = np.sqrt(np.abs(first.diagonal()))
-        relative = np.abs(second - first) / np.maximum(np.outer(scale, scale), 1e-300)
+        before, after = (np.reshape(m.pose.covariance, (6, 6)) for m in (old, new))
+        scale = np.sqrt(np.abs(before.diagonal()))
+        relative = np.abs(after - before) / np.maximum(np.outer(scale, scale), 1e-300)
         yield COVARIANCE, 1e2 * float(relative.max())
-    elif isinstance(old, JointState) and isinstance(new, JointState):
-        yield ANGLE, MILLIDEGREES * _apart(old.position, new.position)
-        yield SPEED, MILLIDEGREES * _apart(old.velocity, new.velocity)
-    elif isinstance(old, JointTrajectory) and isinstance(new, JointTrajectory):
-        for name, values in (
-            (ANGLE, "positions"),
-            (SPEED, "velocities"),
-            (ACCELERATION, "accelerations"),
-        ):
-            flat = [
-                [value for point in plan.points for value in getattr(point, values)]
-                for plan in (old, new)
-            ]
-            yield name, MILLIDEGREES * _apart(*flat)
-    elif isinstance(old, Float64MultiArray) and isinstance(new, Float64MultiArray):
-        yield ANGLE, MILLIDEGREES * _apart(old.data, new.data)
+        return
+    second = _of_motors(new)
+    for name, first in _of_motors(old).items():
+        yield name, MILLIDEGREES * _apart(first, second[name])
+
+
+def _of_motors(message: Message) -> dict[str, Sequence[float]]:
+    """Return what a message says of the motors, by quantity [rad, rad/s, rad/s^2]."""
+    if isinstance(message, JointState):
+        return {ANGLE: message.position, SPEED: message.velocity}
+    if isinstance(message, JointTrajectory):
+        points = message.points
+        return {
+            ANGLE: [value for point in points for value in point.positions],
+            SPEED: [value for point in points for value in point.velocities],
+            ACCELERATION: [value for point in points for value in point.accelerations],
+        }
+    return {ANGLE: message.data} if isinstance(message, Float64MultiArray) else {}
 
 
 def _pose(message: PoseWithCovarianceStamped) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from wrist_stiffness.compensation.parameters import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.inputs.document import Node, node_of, read_yaml
+from wrist_stiffness.inputs.document import Node, read_yaml
 from wrist_stiffness.inputs.schema import Schema, mapping_of, number, record, text, truth
 
 EVERY_NODE = "/**"
@@ -41,12 +41,12 @@ def node_settings(
     `prediction`, `correction`: in SI units.  Raises `InputError` if the file is no parameter file,
     or a parameter is unknown, of another type or out of range.
     """
-    root = node_of({}, "", InputError) if path is None else read_yaml(path, InputError)
-    nodes = {} if path is None else mapping_of(lambda node: node)(root)
-    if path is not None and not any(
-        isinstance(node.value, dict) and KEY in node.value for node in nodes.values()
-    ):
-        raise root.refuse(f"not a ROS 2 parameter file, no node in it has {KEY}")
+    nodes: Mapping[str, Node] = {}
+    if path is not None:
+        root = read_yaml(path, InputError)
+        nodes = mapping_of(lambda node: node)(root)
+        if not any(isinstance(each.value, dict) and KEY in each.value for each in nodes.values()):
+            raise root.refuse(f"not a ROS 2 parameter file, no node in it has {KEY}")
     names = dict(zip(("motor_1_joint", "motor_2_joint"), joints, strict=False))
     predictor = _values(nodes, PREDICTOR, (*COMMON, *PREDICTION))
     corrector = _values(nodes, CORRECTOR, (*COMMON, *CORRECTION))

@@ -12,13 +12,12 @@ from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.planning.earlier import as_experiment
 from wrist_stiffness.planning.information import MeasurementNoise
 from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
 from wrist_stiffness.planning.question import Question, between, commissioning
-from wrist_stiffness.planning.rivals import read_rivals
-from wrist_stiffness.planning.timeline import Pace, Timeline
+from wrist_stiffness.planning.rivals import dwell_noise, read_rivals
+from wrist_stiffness.planning.timeline import Pace, Timeline, as_experiment
 from wrist_stiffness.progress import Progress, silent
 
 MDEG = float(np.radians(1e-3))
@@ -108,27 +107,15 @@ def plan_experiment(
     options: Options,
     diagnosis: str | Path | None = None,
     recordings: Recordings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Planned:
     """Plan the first experiment on a wrist, or the next one between rivals.
 
-    Parameters
-    ----------
-    model_file, loads : path
-        Model, and the loads that the user can apply.
-    options : Options
-        The first experiment needs a duration; the next one takes what it needs without.
-    diagnosis : path, optional
-        Result of `diagnose --json`: what it could not tell apart is asked.
-    recordings : Recordings, optional
-        Those of the diagnosis: its rivals are fitted to them, and what it left open counts as open.
-    progress : callable, optional
-        Called with (done, total).
-
-    Raises
-    ------
-    WristError
-        If a file is wrong, nothing is left to separate, or nothing fits into the duration.
+    `loads`: file of the loads that the user can apply; `options`: the first experiment needs a
+    duration, the next one takes what it needs without; `diagnosis`: result of `diagnose --json`;
+    what it could not tell apart is asked; `recordings`: those of the diagnosis: its rivals are
+    fitted to them, and what it left open counts as open.  Raises `WristError` if a file is wrong,
+    nothing is left to separate, or nothing fits into the duration.
     """
     model, rng, earlier = load_model(model_file), np.random.default_rng(options.seed), []
     if diagnosis is None:
@@ -140,7 +127,7 @@ def plan_experiment(
     else:
         rivals = read_rivals(diagnosis)
         question = between(rivals.classes, rivals.silent, rng)
-        noise = rivals.noise(model.table)
+        noise = dwell_noise(model.table, rivals.floor)
         if recordings is not None:
             sessions = read_sessions(recordings, [model], silent)
             earlier = [as_experiment(model, session) for session in sessions.values()]

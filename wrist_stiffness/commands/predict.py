@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.lookup.table import Evaluation
 from wrist_stiffness.mechanism.components import ELASTIC, Array
-from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.model_file import load_model
@@ -61,9 +60,9 @@ def predict(
     """Predict the pose error at one pose under one load.
 
     `angles`: motor angles [rad]; `load`: wrench on the platform at O [N, N m]; `on_platform`:
-    whether the wrench is given in `wrist_platform` instead of `wrist_base`; `both`: also evaluate
-    the table in the way that the nodes do not use.  Gives `PosePrediction`: the error and where it
-    comes from.  Raises `WristError` if the model cannot be read, or pose or load are out of range.
+    whether it is given in `wrist_platform` instead of `wrist_base`; `both`: also evaluate the table
+    in the way that the nodes do not use.  Raises `WristError` if the model cannot be read, or pose
+    or load are out of range.
     """
     error_model = load_model(model)
     theta, wrench = np.array(angles, dtype=float), Load(np.array(load, dtype=float), on_platform)
@@ -76,7 +75,8 @@ def predict(
     configuration = prediction.configuration
     exact = None
     if past_first_order(prediction) and not error_model.effects:
-        exact = _exact(table, configuration, wrench)
+        state = ExactWrist(table, ()).solve(theta, wrench.in_base(configuration))
+        exact = log_motion(state.rotation @ configuration.platform.T, state.shift)
     return PosePrediction(
         prediction=prediction,
         evaluation=error_model.evaluation,
@@ -92,12 +92,6 @@ def predict(
 def past_first_order(prediction: Prediction) -> bool:
     """Whether the platform turns by more than first order holds for."""
     return prediction.phi > FIRST_ORDER_LIMIT
-
-
-def _exact(table: Table, configuration: Configuration, load: Load) -> Array:
-    """Twist (6,) of the platform from the equilibrium of all bodies with finite rotations."""
-    state = ExactWrist(table, ()).solve(configuration.theta, load.in_base(configuration))
-    return log_motion(state.rotation @ configuration.platform.T, state.shift)
 
 
 def _lengths(twist: Array) -> dict[str, float]:

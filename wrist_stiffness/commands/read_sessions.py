@@ -67,19 +67,13 @@ def read_sessions(
     WristError
         If a recording cannot be used.
     """
-    paths, motors = recordings_in(recordings.paths), recordings.settings.motors
+    paths = recordings_in(recordings.paths)
     found: dict[Path, MeasuredSession] = {}
     first: dict[str, Path] = {}
     for done, path in enumerate(paths):
         progress(done, len(paths))
-        session = read_session(
-            path,
-            models[0].table,
-            remaps=recordings.topics,
-            joints=(motors.motor_1, motors.motor_2),
-            frames=recordings.settings.frames,
-            load_age_limit_s=recordings.settings.load_age_limit_s,
-        )
+        table, settings = models[0].table, recordings.settings
+        session = read_session(path, table, remaps=recordings.topics, settings=settings)
         same = first.setdefault(measured_sha256(session), path)
         if same == path:
             found[path] = _with_remarks(
@@ -159,10 +153,7 @@ def sha256_by_name(sessions: Mapping[Path, MeasuredSession]) -> dict[str, str]:
 
 
 def recording_sha256(path: Path) -> str:
-    """Return the SHA-256 of a recording's storage file, or of the checksums of several.
-
-    Raises `InputError` if a file cannot be read.
-    """
+    """Return the SHA-256 of a recording's file, or of the checksums of several (InputError)."""
     if not path.is_dir():
         return file_sha256(path)
     files = sorted(path.glob("*.mcap"))

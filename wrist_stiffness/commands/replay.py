@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wrist_stiffness import topics
 from wrist_stiffness.commands.parameter_file import node_settings
 from wrist_stiffness.commands.replay_block import BlockReplay
 from wrist_stiffness.commands.replay_summary import ReplaySummary
@@ -46,54 +47,35 @@ from wrist_stiffness.recording.messages import (
 from wrist_stiffness.recording.raw_block import RawMessage
 from wrist_stiffness.recording.reader import Recording, open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
-from wrist_stiffness.topics import (
-    BASE_FRAME,
-    CORRECTED_FRAME,
-    COVARIATES,
-    JOINT_STATES,
-    LOAD_ESTIMATE,
-    MICROMETRES,
-    MILLIDEGREES,
-    MOTOR_COMMANDS,
-    MOTOR_COMMANDS_CORRECTED,
-    MOTOR_POSITIONS_CORRECTED,
-    MOTOR_TRAJECTORY,
-    MOTOR_TRAJECTORY_CORRECTED,
-    POSE_ERROR_PHI_MDEG,
-    POSE_ERROR_PREDICTED,
-    POSE_ERROR_RESIDUAL,
-    POSE_ERROR_RESIDUAL_TASK,
-    POSE_ERROR_S_UM,
-    TEMPERATURES,
-    TF_STATIC,
-    WRIST_MARKERS,
-)
+from wrist_stiffness.topics import BASE_FRAME, CORRECTED_FRAME, MICROMETRES, MILLIDEGREES
 
 OUTPUTS = (
-    POSE_ERROR_PREDICTED,
-    POSE_ERROR_RESIDUAL,
-    POSE_ERROR_RESIDUAL_TASK,
-    MOTOR_COMMANDS_CORRECTED,
-    MOTOR_POSITIONS_CORRECTED,
-    MOTOR_TRAJECTORY_CORRECTED,
+    topics.POSE_ERROR_PREDICTED,
+    topics.POSE_ERROR_RESIDUAL,
+    topics.POSE_ERROR_RESIDUAL_TASK,
+    topics.MOTOR_COMMANDS_CORRECTED,
+    topics.MOTOR_POSITIONS_CORRECTED,
+    topics.MOTOR_TRAJECTORY_CORRECTED,
 )
 
-LEFT_OUT = frozenset({*OUTPUTS, POSE_ERROR_S_UM, POSE_ERROR_PHI_MDEG, WRIST_MARKERS})
+LEFT_OUT = frozenset(
+    {*OUTPUTS, topics.POSE_ERROR_S_UM, topics.POSE_ERROR_PHI_MDEG, topics.WRIST_MARKERS}
+)
 """What an earlier run left in the input; s, phi and the drawing follow from the pose and need no
 comparing."""
 
 TYPES: dict[str, type[Message]] = {
-    JOINT_STATES: JointState,
-    LOAD_ESTIMATE: WrenchStamped,
-    MOTOR_COMMANDS: JointState,
-    TEMPERATURES: Temperature,
-    TF_STATIC: TFMessage,
-    MOTOR_TRAJECTORY: JointTrajectory,
+    topics.JOINT_STATES: JointState,
+    topics.LOAD_ESTIMATE: WrenchStamped,
+    topics.MOTOR_COMMANDS: JointState,
+    topics.TEMPERATURES: Temperature,
+    topics.TF_STATIC: TFMessage,
+    topics.MOTOR_TRAJECTORY: JointTrajectory,
 }
 """Topics that are used, besides those below `/covariates/`."""
 
-REQUIRED = (JOINT_STATES, LOAD_ESTIMATE)
-SAMPLED = (JOINT_STATES, MOTOR_COMMANDS, MOTOR_TRAJECTORY)
+REQUIRED = (topics.JOINT_STATES, topics.LOAD_ESTIMATE)
+SAMPLED = (topics.JOINT_STATES, topics.MOTOR_COMMANDS, topics.MOTOR_TRAJECTORY)
 """Topics whose messages are answered."""
 
 
@@ -102,40 +84,22 @@ def replay(
     model: str | Path,
     output: str | Path,
     settings: tuple[StreamSettings, StreamSettings] | None = None,
-    topics: Mapping[str, str] | None = None,
+    remaps: Mapping[str, str] | None = None,
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> ReplaySummary:
     """Write a recording again with predicted errors and corrected commands added.
 
-    Parameters
-    ----------
-    recording : path
-        Folder or `.mcap` file.
-    output : path
-        Folder or `.mcap` file to write: the input, plus the outputs that the nodes would have sent.
-    settings : (StreamSettings, StreamSettings), optional
-        As the nodes'; the defaults if None.
-    topics : mapping, optional
-        Actual by standard topic name.
-    progress : callable
-        Called with messages done and in all.
-
-    Returns
-    -------
-    ReplaySummary
-        Counts and reasons.
-
-    Raises
-    ------
-    WristError
-        If the model or the recording cannot be used, or no joint state at all can be predicted;
-        then nothing is written.
+    `recording`, `output`: folders or `.mcap` files; the output holds the input and what the nodes
+    would have sent; `settings`: of predictor and corrector, as the nodes'; the defaults if None;
+    `remaps`: actual by standard topic name; `progress`: called with messages done and in all.
+    Raises `WristError` if the model or the recording cannot be used, or no joint state at all can
+    be predicted; then nothing is written.
     """
     prediction, correction = settings or node_settings(None)
     error_model = load_model(model)
     source = open_recording(recording)
-    names = _actual_names(source, topics or {})
+    names = _actual_names(source, remaps or {})
     signals = {actual: standard for standard, actual in names.items() if standard not in SAMPLED}
     sampled = {names[standard]: standard for standard in SAMPLED if standard in names}
     summary = ReplaySummary()
@@ -192,11 +156,11 @@ def _answers(
     drawings: Drawings,
     summary: ReplaySummary,
 ) -> Iterator[tuple[str, Message | bytes]]:
-    if standard == MOTOR_TRAJECTORY:
+    if standard == topics.MOTOR_TRAJECTORY:
         plan = decode(JointTrajectory, raw.payload)
         return _plan(plan, raw.log_time_ns, correcting, summary)
     state = decode(JointState, raw.payload)
-    if standard == MOTOR_COMMANDS:
+    if standard == topics.MOTOR_COMMANDS:
         return _correct(state, correcting, summary)
     return _predict(state, predicting, drawings, summary)
 
@@ -204,7 +168,7 @@ def _answers(
 def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str]:
     """Return the actual by the standard name of every topic that is there to be used."""
     present = {topic.name: topic for topic in source.topics}
-    covariates = (name for name in (*present, *chosen) if name.startswith(COVARIATES))
+    covariates = (name for name in (*present, *chosen) if name.startswith(topics.COVARIATES))
     types: dict[str, type[Message]] = {**TYPES, **dict.fromkeys(covariates, Float64)}
     names = {}
     for standard, wanted in types.items():
@@ -247,15 +211,15 @@ def _predict(
     summary.shift_um.add(np.array([prediction.shift_norm * MICROMETRES]))
     summary.phi_mdeg.add(np.array([prediction.phi * MILLIDEGREES]))
     header = Header(state.header.stamp_ns, BASE_FRAME)
-    yield POSE_ERROR_PREDICTED, pose_message(header, prediction.twist, prediction.covariance)
+    yield topics.POSE_ERROR_PREDICTED, pose_message(header, prediction.twist, prediction.covariance)
     for topic, vector in (
-        (POSE_ERROR_S_UM, MICROMETRES * prediction.twist[:3]),
-        (POSE_ERROR_PHI_MDEG, MILLIDEGREES * prediction.twist[3:]),
+        (topics.POSE_ERROR_S_UM, MICROMETRES * prediction.twist[:3]),
+        (topics.POSE_ERROR_PHI_MDEG, MILLIDEGREES * prediction.twist[3:]),
     ):
         yield topic, Vector3Stamped(header, Vector3(*vector.tolist()))
     one = np.array([state.header.stamp_ns]), prediction.configuration.as_block
     for drawn in drawings.of(*one, prediction.twist[None])[1]:
-        yield WRIST_MARKERS, drawn
+        yield topics.WRIST_MARKERS, drawn
 
 
 def _correct(
@@ -266,19 +230,19 @@ def _correct(
         state.header.stamp_ns, state.header.frame_id, state.name, state.position, state.velocity
     )
     if corrected.fault is not None:
-        summary.refuse(MOTOR_COMMANDS, corrected.fault)
+        summary.refuse(topics.MOTOR_COMMANDS, corrected.fault)
     summary.corrections += corrected.correction is not None
     header = Header(state.header.stamp_ns, CORRECTED_FRAME)
     yield (
-        MOTOR_COMMANDS_CORRECTED,
+        topics.MOTOR_COMMANDS_CORRECTED,
         JointState(
             header, state.name, tuple(corrected.positions.tolist()), state.velocity, state.effort
         ),
     )
-    yield MOTOR_POSITIONS_CORRECTED, Float64MultiArray(data=tuple(corrected.theta.tolist()))
+    yield topics.MOTOR_POSITIONS_CORRECTED, Float64MultiArray(data=tuple(corrected.theta.tolist()))
     header = Header(state.header.stamp_ns, BASE_FRAME)
-    topics = (POSE_ERROR_RESIDUAL, POSE_ERROR_RESIDUAL_TASK)
-    for topic, residual in zip(topics, correcting.residuals(corrected), strict=False):
+    names = topics.POSE_ERROR_RESIDUAL, topics.POSE_ERROR_RESIDUAL_TASK
+    for topic, residual in zip(names, correcting.residuals(corrected), strict=False):
         yield topic, pose_message(header, *residual)
 
 
@@ -298,7 +262,7 @@ def _plan(
         ],
     )
     if corrected.fault is not None:
-        summary.refuse(MOTOR_TRAJECTORY, corrected.fault)
+        summary.refuse(topics.MOTOR_TRAJECTORY, corrected.fault)
     summary.corrected_trajectories += corrected.fault is None
     points = tuple(
         replace(
@@ -310,14 +274,11 @@ def _plan(
         for point, planned in zip(plan.points, corrected.points, strict=True)
     )
     header = replace(plan.header, frame_id=corrected.frame_id)
-    yield MOTOR_TRAJECTORY_CORRECTED, replace(plan, header=header, points=points)
+    yield topics.MOTOR_TRAJECTORY_CORRECTED, replace(plan, header=header, points=points)
 
 
 def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
-    """Return a twist as a recording's message.
-
-    `twist` (6,): at O in F [m, rad]; `covariance` (6, 6): of the twist.
-    """
+    """Return a twist (6,) at O in F [m, rad] with its covariance (6, 6) as a message."""
     position, quaternion = pose_of_twist(twist)
     pose = Pose(Point(*position.tolist()), Quaternion(*quaternion.tolist()))
     return PoseWithCovarianceStamped(

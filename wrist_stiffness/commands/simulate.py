@@ -14,7 +14,7 @@ from wrist_stiffness.commands.cell_messages import CellMessages
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.registry import unknown_effect
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.sessions.refitted import SET_UP
@@ -45,7 +45,7 @@ LONGEST_S, FASTEST_HZ = 24.0 * 3600.0, 5000.0
 class Simulated:
     """What was written."""
 
-    path: Path
+    recording: Path
     samples: int  # samples on each topic
     seconds: float  # duration [s]
 
@@ -56,30 +56,16 @@ def simulate_recording(
     settings: CellSettings,
     seconds: float,
     seed: int,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     overwrite: bool = False,
 ) -> Simulated:
     """Let the virtual cell work and record it.
 
-    Parameters
-    ----------
-    path : path
-        rosbag2 folder, or file where it ends in `.mcap`.
-    settings : CellSettings
-        Program, rate, sensors; sessions are days.
-    seconds : float
-        Duration [s].
-    seed : int
-        Of all noise; the same seed gives the same bytes.
-    progress : callable, optional
-        Is told samples done and samples in all.
-
-    Raises
-    ------
-    InputError
-        If duration or rate are out of bounds or the seed is negative.
-    RecordingError
-        If the recording exists or cannot be written.
+    `path`: rosbag2 folder, or file where it ends in `.mcap`; `settings`: program, rate, sensors;
+    sessions are days; `seconds`: duration [s]; `seed`: of all noise; the same seed gives the same
+    bytes; `progress`: told samples done and in all.  Raises `InputError` if duration or rate are
+    out of bounds or the seed is negative; `RecordingError` if the recording exists or cannot be
+    written.
     """
     check_bounds(seconds, settings.rate_hz, seed)
     cell = VirtualCell(table, settings, np.random.default_rng(seed))
@@ -97,16 +83,12 @@ def simulate_recording(
             block = cell.run(time_s, sent)
             stamps_ns = start_ns + np.round(time_s * 1e9).astype(np.int64)
             messages.write(stamps_ns.tolist(), sent, block, number % thermometer == 0)
-            if progress is not None:
-                progress(int(number[-1]) + 1, total)
+            progress(int(number[-1]) + 1, total)
     return Simulated(Path(path), total, total / settings.rate_hz)
 
 
 def check_bounds(seconds: float, rate_hz: float, seed: int) -> None:
-    """Refuse what would be no recording, or never end.
-
-    Raises `InputError` with the limit.
-    """
+    """Refuse what would be no recording, or never end (InputError with the limit)."""
     if not 0.0 < seconds <= LONGEST_S:
         raise InputError(
             f"simulate: a duration of {seconds:g} s is not more than 0 and at most {LONGEST_S:g} s"
@@ -157,17 +139,6 @@ def hide(
     return replace(settings, hidden=(*settings.hidden, hidden))
 
 
-def hide_blind(
-    seed: int,
-    table: Table,
-    settings: CellSettings,
-    seconds: float,
-    tell: Callable[[str], None] = lambda text: None,
-) -> CellSettings:
-    """Return the settings with the effect that a seed draws."""
-    return replace(settings, hidden=(secret(seed, table, settings, seconds, tell).hidden,))
-
-
 def secret(
     seed: int,
     table: Table,
@@ -185,9 +156,8 @@ def secret(
 def on_day(day: int, settings: CellSettings) -> CellSettings:
     """Return the settings of another day, from 1, of the same wrist with the same hidden effects.
 
-    The instrument was set up anew, and the wrist moves to other poses under other loads.
-
-    Raises `InputError` if there is no such day.
+    The instrument was set up anew, and the wrist moves to other poses under other loads.  Raises
+    `InputError` if there is no such day.
     """
     if not 1 <= day <= LAST_DAY:
         raise InputError(f"simulate: day {day} is not 1 to {LAST_DAY}")

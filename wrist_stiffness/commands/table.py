@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -42,27 +42,12 @@ def build(
 
     Condensed parts are kept beside the table until it is written.
 
-    Parameters
-    ----------
-    output : path
-        Table file to write, `.npz`.
-    evaluation : str
-        What the nodes shall use, `closed_form` or `spline`.
-    interface : str
-        `rigid`, `distributing` or `sliding` walls.
-    tolerance : float
-        Relative error of s and phi that mesh, contact rings and grid are refined to.
-    per_axis : int or None
-        Fixed grid, 5 for the paper's 25 poses; None refines it too.
-    progress : callable
-        Called with steps done and in all.
-
-    Raises
-    ------
-    WristError
-        If the geometry is wrong, the tolerance is not met or the file cannot be written.
-    KeyboardInterrupt
-        Says what is kept.
+    `output`: table file, `.npz`; `evaluation`: what the nodes shall use, `closed_form` or `spline`;
+    `interface`: `rigid`, `distributing` or `sliding` walls; `tolerance`: relative error of s and
+    phi that mesh, contact rings and grid are refined to; `per_axis`: fixed grid, 5 for the paper's
+    25 poses; None refines it too; `progress`: called with steps done and in all.  Raises
+    `WristError` if the geometry is wrong, the tolerance is not met or the file cannot be written;
+    `KeyboardInterrupt` that says what is kept.
     """
     from wrist_stiffness.fem.condensed_store import CondensedStore
     from wrist_stiffness.fem.sweep import BuildSettings, build_table
@@ -107,8 +92,7 @@ def build(
 def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
     """Condense a link drawn in CAD, its stiffness in the units of a geometry file [N, mm].
 
-    `step`: STEP file, see `fem/step_part.py`.  Gives `StepPart`: as `matrix_N_mm` reads.  Raises
-    `GeometryError` if a file is wrong.
+    `step`: STEP file, see `fem/step_part.py`.  Raises `GeometryError` if a file is wrong.
     """
     from wrist_stiffness.fem.components import SHIPPED_SIZES
     from wrist_stiffness.fem.step_part import step_part
@@ -117,19 +101,11 @@ def part(step: str | Path, geometry: str | Path, link: str) -> StepPart:
     return replace(found, stiffness=in_millimetres(found.stiffness))
 
 
-@dataclass(frozen=True)
-class MapSummary:
-    """Statistics of the rated load's map."""
-
-    # mean, min and max by quantity over the operative workspace, with the unit in the name
-    operative: dict[str, dict[str, float]]
-    domain_max: dict[str, float]  # maxima over the whole map
-
-
-def summarise(table: Table) -> MapSummary:
+def summarise(table: Table) -> dict[str, dict[str, Any]]:
     """Return the statistics of Tables 1 and 2 for a table, on a fine grid over the map.
 
-    Gives `MapSummary`: in micrometres and millidegrees.
+    Gives as `operative` mean, min and max over the operative workspace, as `domain_max` the maxima
+    over the whole map, both by quantity with its unit.
     """
     workspace = table.workspace
     poses = workspace.grid(FINE)
@@ -145,4 +121,4 @@ def summarise(table: Table) -> MapSummary:
         for name, column in zip(names, inside.T, strict=True)
     }
     domain = {name: float(column.max()) for name, column in zip(names, values.T, strict=True)}
-    return MapSummary(operative, domain)
+    return {"operative": operative, "domain_max": domain}

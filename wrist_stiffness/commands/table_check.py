@@ -40,9 +40,9 @@ def check(
 ) -> list[Finding]:
     """Verify a table: all checks; the table is good if all passed.
 
-    `geometry`: geometry file that the table must be of; `rebuild`: also condense the parts and
-    sweep again, and compare all numbers; `progress`: called with steps done and in all.  Raises
-    `TableError` or `GeometryError` if a file cannot be read at all.
+    `geometry`: file that the table must be of; `rebuild`: also condense the parts and sweep again,
+    and compare all numbers.  Raises `TableError` or `GeometryError` if a file cannot be read at
+    all.
     """
     table = load_table(path)
     findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]

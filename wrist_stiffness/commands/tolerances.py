@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -95,23 +95,13 @@ def tolerances_of(limits: Mapping[str, float]) -> tuple[Tolerance, ...]:
     return tuple(found)
 
 
-@dataclass(frozen=True)
-class Sums:
+class Sums(NamedTuple):
     """What many wrists add up to; sums of sums are those of all."""
 
-    count: int  # wrists
+    wrists: int
     products: Array  # (1 + k, 1 + k), of 1 and the k standardised tolerances with each other
     answers: Array  # (1 + k, p * 6), of these with what the wrists err by at p poses [m, rad]
     squares: Array  # (p * 6,), of what they err by
-
-    def __add__(self, other: Sums) -> Sums:
-        """Return those of both."""
-        return Sums(
-            self.count + other.count,
-            self.products + other.products,
-            self.answers + other.answers,
-            self.squares + other.squares,
-        )
 
 
 @dataclass(frozen=True)
@@ -203,20 +193,17 @@ def study_tolerances(
     one = partial(
         wrist_sums, Path(model).absolute(), tolerances, tuple(map(float, load)), seed, wrists
     )
-    total: Sums | None = None
-    told = partial(_tell, progress, wrists)
+
+    def told(done: int, _: int) -> None:
+        progress(min(done * WRISTS_AT_A_TIME, wrists), wrists)
+
+    parts = []
     for answer in spread(one, firsts, workers, told):
         if answer.result is None:
             raise InputError(f"tolerances: {answer.error}")
-        total = answer.result if total is None else total + answer.result
-    if total is None:
-        raise InputError("tolerances: no wrists")
-    name = load_model(model).name
-    return _study(name, tolerances, load, total)
-
-
-def _tell(progress: Progress, wrists: int, done: int, _: int) -> None:
-    progress(min(done * WRISTS_AT_A_TIME, wrists), wrists)
+        parts.append(answer.result)
+    total = Sums(*(sum(each) for each in zip(*parts, strict=True)))
+    return _study(load_model(model).name, tolerances, load, total)
 
 
 def wrist_sums(
@@ -300,7 +287,7 @@ def _shift(table: Table, tolerance: Tolerance) -> Array:
 def _study(
     name: str, tolerances: Sequence[Tolerance], load: Sequence[float], total: Sums
 ) -> ToleranceStudy:
-    n, k = total.count, len(tolerances)
+    n, k = total.wrists, len(tolerances)
     inverse = np.linalg.inv(total.products)
     slopes = inverse @ total.answers
     rest = np.maximum(total.squares - (slopes * total.answers).sum(axis=0), 0.0) / (n - k - 1)

@@ -57,9 +57,7 @@ class Contribution:
     """One part of a prediction's error."""
 
     name: str  # where it comes from
-    # `s`, `phi`: what 99 of 100 poses and loads keep, relative to s and phi
-    s: float
-    phi: float
+    bound: Mapping[str, float]  # what 99 of 100 poses and loads keep, relative to s and phi
     stated: bool  # whether it is in what the table states
 
 
@@ -71,9 +69,9 @@ def contributions(table: Table) -> list[Contribution]:
     errors, found = table.header.errors, []
     for part, name in STATED_PARTS.items():
         if bound := errors.get(part):
-            found.append(_contribution(name, bound, True))
+            found.append(Contribution(name, bound, True))
     used = table.header.evaluation == "spline"
-    found.append(_contribution("spline", errors["predicted"]["operative"], used))
+    found.append(Contribution("spline", errors["predicted"]["operative"], used))
     poses, loads = _draws(table, DRAWS)
     configuration = table.mechanism.forward(poses)
 
@@ -86,7 +84,7 @@ def contributions(table: Table) -> list[Contribution]:
         misses = [relative_misses(twist(parts), nominal) for parts in varied]
         # Parts are made one by one, so their errors add up as squares do.
         bound = _bound(np.sqrt(np.sum(np.square(misses), axis=0)))
-        found.append(_contribution(name, bound, False))
+        found.append(Contribution(name, bound, False))
     return found
 
 
@@ -123,10 +121,6 @@ def _draws(table: Table, count: int) -> tuple[Array, Array]:
 
 def _bound(misses: Array) -> dict[str, float]:
     return dict(zip(HALVES, np.quantile(misses, STATED, axis=0).tolist(), strict=True))
-
-
-def _contribution(name: str, bound: Mapping[str, float], stated: bool) -> Contribution:
-    return Contribution(name, bound["s"], bound["phi"], stated)
 
 
 def _tolerances(table: Table) -> Iterator[tuple[str, list[ElasticComponents]]]:

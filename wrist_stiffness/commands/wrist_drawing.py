@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,10 +69,7 @@ class Pace:
 
 
 class WristDrawing:
-    """Draws one wrist.
-
-    `exaggeration`: factor on the error's twist [-]; `frame_id`: name of F.
-    """
+    """Draws one wrist; `exaggeration`: factor on the error's twist [-]; `frame_id`: name of F."""
 
     def __init__(self, geometry: Geometry, exaggeration: float, frame_id: str = BASE_FRAME) -> None:
         self._geometry = geometry
@@ -138,46 +136,34 @@ class WristDrawing:
 
     def _markers(self, text: str) -> tuple[Marker, ...]:
         header, geometry, plate = Header(0, self._frame_id), self._geometry, self._geometry.platform
-        links = [
-            Marker(
-                header,
-                link,
-                type=MarkerShape.LINE_STRIP,
-                color=STEEL,
-                scale=Vector3(geometry.links[link].section_radial, 0.0, 0.0),
-                points=(Point(),) * ARC_POINTS,
-            )
-            for link in LINKS
-        ]
-        platforms = [
-            Marker(
-                header,
-                name,
-                type=MarkerShape.CYLINDER,
-                color=color,
-                scale=Vector3(plate.diameter, plate.diameter, plate.thickness),
-            )
-            for name, color in (("platform rigid", RIGID), ("platform", ACTUAL))
-        ]
+
+        def marker(name: str, shape: int, colour: ColorRGBA, *size: float, **more: Any) -> Marker:
+            scale = Vector3(*size)
+            return Marker(header, name, type=shape, color=colour, scale=scale, **more)
+
+        radial = {link: geometry.links[link].section_radial for link in LINKS}
+        disc = plate.diameter, plate.diameter, plate.thickness
+        arc = (Point(),) * ARC_POINTS
         height = 1.5 * max(link.arc_radius for link in geometry.links.values())
+        above = Pose(Point(0.0, 0.0, height))
         return (
-            *links,
-            *platforms,
-            Marker(
-                header,
-                "shift of O",
-                type=MarkerShape.ARROW,
-                color=ARROW,
-                scale=Vector3(0.0015, 0.003, 0.0),
-                points=(Point(), Point()),
+            *(
+                marker(link, MarkerShape.LINE_STRIP, STEEL, radial[link], points=arc)
+                for link in LINKS
             ),
-            Marker(
-                header,
+            marker("platform rigid", MarkerShape.CYLINDER, RIGID, *disc),
+            marker("platform", MarkerShape.CYLINDER, ACTUAL, *disc),
+            marker(
+                "shift of O", MarkerShape.ARROW, ARROW, 0.0015, 0.003, points=(Point(), Point())
+            ),
+            marker(
                 "legend",
-                type=MarkerShape.TEXT_VIEW_FACING,
-                color=ARROW,
-                pose=Pose(Point(0.0, 0.0, height)),
-                scale=Vector3(0.0, 0.0, 0.005),
+                MarkerShape.TEXT_VIEW_FACING,
+                ARROW,
+                0.0,
+                0.0,
+                0.005,
+                pose=above,
                 text=text,
             ),
         )

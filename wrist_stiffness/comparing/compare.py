@@ -10,6 +10,7 @@ from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
 from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.set_up import FREE, without_set_up
 from wrist_stiffness.comparing.wiring import (
+    LOAD_MISTAKES,
     MISTAKES,
     Mistake,
     Suspicion,
@@ -17,16 +18,22 @@ from wrist_stiffness.comparing.wiring import (
     told_mistake,
 )
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.identification.calibration import said_calibrated
+from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
+from wrist_stiffness.identification.free_effects import answering_as
 from wrist_stiffness.inference.settings import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import Observed
+from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
 from wrist_stiffness.sessions.repeatability import by_side, repeatability
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 Prepared = tuple[Observed, Explained, tuple[str, ...]]
+
+VERY_STRONG = 5.0
+"""Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
+"""
 
 
 def compare_models(
@@ -36,10 +43,8 @@ def compare_models(
 ) -> Comparison:
     """Say how far models are off from measured sessions, where and under which condition.
 
-    `models`: name of each for the report, and the model; all of one wrist.  `sessions`: in the
-    order of time.  `progress`: told steps done and in all.  Gives `Comparison`: in the order of the
-    models.  Raises `InputError` if there is too little to compare, or the models are not of one
-    wrist.
+    `models`: name of each for the report, and the model; `sessions`: in the order of time.  Raises
+    `InputError` if there is too little to compare, or the models are not of one wrist.
     """
     steps = len(models) + 1
     progress(0, steps)
@@ -72,8 +77,7 @@ def suspicion_in(
 ) -> Suspicion | None:
     """Return the mistake of signs, units or names that explains most of an error; None for none.
 
-    `model`: with which the sessions are compared; `sessions`: in the order of time; `mistakes`:
-    those that are tried.  Raises `InputError` if there is too little to compare.
+    Raises `InputError` if there is too little to compare.
     """
     cuts = all_units(model, sessions)
     calibrated = said_calibrated(sessions)
@@ -114,3 +118,48 @@ def _same_wrist(one: ErrorModel, other: ErrorModel) -> bool:
     """Tell whether the rigid wrists are the same; parts may differ, they are what is compared."""
     first, second = one.table.geometry, other.table.geometry
     return all(np.array_equal(first.axes[joint], second.axes[joint]) for joint in first.axes)
+
+
+def wrong_load(
+    model: ErrorModel,
+    fitted: ErrorModel,
+    sessions: Sequence[MeasuredSession],
+    found: Calibration | None = None,
+    progress: Progress = silent,
+) -> str:
+    """Return the mistake of a load that a fit hides, in a sentence; empty for none.
+
+    A fit takes such a load up in parts as stiff or as soft as can be, in the sensor's scale and
+    tare, and in axes off their drawing.  Beside all these a load that is put right explains only
+    part of what is left.  So where it explains some, the wrist is fitted anew under that load.
+
+    `model`, `fitted`: before and after the fit; `found`: the fit, if it was one, else it is made.
+    Raises `InputError` if there is too little to compare.
+    """
+    suspicion = suspicion_in(answering_as(model, fitted), sessions, LOAD_MISTAKES)
+    if suspicion is None:
+        return ""
+    before = found or calibrate(model, sessions)
+    right = tuple(suspicion.mistake.measured_right(session) for session in sessions)
+    after = calibrate(model, right, progress)
+    if _gain(before, after) < VERY_STRONG:
+        return ""
+    left = " and ".join(
+        f"{after.after[q.key]:.3g} {q.unit} of {q.name}, not {before.after[q.key]:.3g},"
+        for q in before.fit.problem.table.reported
+    )
+    return suspicion.told(f"a fit leaves {left} and parts nearer to their drawing")
+
+
+def doubts_load(found: Calibration) -> bool:
+    """Tell whether the wrist answers loads so unusually that these may be wrong."""
+    answering = (p for p in found.parameters if p.effect.partition("@")[0] in ANSWERS_LOAD)
+    return any(each.far or each.at_bound for each in answering)
+
+
+def _gain(before: Calibration, after: Calibration) -> float:
+    """Return the gain of log evidence; under another load other units may lie in the range."""
+    found = [each.fit.fit.evidence for each in (before, after)]
+    counts = [len(each.point.left) for each in found]
+    first, second = (each.log / count for each, count in zip(found, counts, strict=True))
+    return (second - first) * min(counts)

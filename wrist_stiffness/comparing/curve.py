@@ -59,6 +59,12 @@ class Curve:
         """One standard uncertainty of the fitted law, (c,)."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
+    def along(self, values: Array) -> Array:
+        """Return the part of values (u, m) along the direction in the quantity's unit, (u,)."""
+        columns, used = list(self.quantity.components), self.direction != 0.0
+        part = values[:, columns][:, used] @ self.direction[used]
+        return np.asarray(part * self.quantity.per_si)
+
     @property
     def where(self) -> str:
         """The direction in words, as `extend --direction` takes it."""
@@ -131,7 +137,9 @@ def curve_of(
     order = np.argsort(places[:, 0], kind="stable") if len(names) == 1 else np.arange(count)
     mean = (of_classes @ values)[order]
     # Towards what it does for more of the condition; on a map, where it does most.
-    turned = mean[np.argmax(np.abs(mean))] if len(names) == 2 else _rise(mean)
+    turned = np.argmax(mean) - np.argmin(mean)
+    if len(names) == 2:
+        turned = mean[np.argmax(np.abs(mean))]
     sign = -1.0 if turned < 0.0 else 1.0
     direction = np.zeros(len(quantity.components))
     direction[[quantity.components.index(c) for c in at]] = sign * ways[0]
@@ -146,10 +154,6 @@ def curve_of(
         sign * mean,
         (of_classes @ covariance @ of_classes.T)[np.ix_(order, order)],
     )
-
-
-def _rise(mean: Array) -> float:
-    return float(np.argmax(mean) - np.argmin(mean))
 
 
 def _best(

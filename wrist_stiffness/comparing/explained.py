@@ -274,20 +274,11 @@ def explain(
 ) -> Explained:
     """Return what is left of the units, to be taken apart.
 
-    Parameters
-    ----------
-    left : Observations
-        Residuals after a fit of the set-up, and maybe of more.
-    sessions : sequence of UnitSession
-        Of which.
-    columns : (u, 6, p) float
-        Change of that by a step of each parameter that was fitted [m, rad].
-    z : (p,) float
-        Those parameters in steps, from the means of their priors.
-    weights : (u, 6) float
-        What the square of each number counted in the fit.
-    prior : (p,) float, optional
-        Weights of the priors of the parameters in that fit; by default 1.
+    `left`: residuals of the sessions after a fit of the set-up, and maybe of more; `columns` (u, 6,
+    p): change of that by a step of each parameter that was fitted [m, rad]; `z` (p,): those
+    parameters in steps, from the means of their priors; `weights` (u, 6): what the square of each
+    number counted in the fit; `prior` (p,): weights of the priors of the parameters in that fit, by
+    default 1.
     """
     table = WristTable(left, sessions, unstated(left, left.values, columns), finer_questions)
     white = table.whiten(left.values)

@@ -99,9 +99,7 @@ def refit_set_up(
 ) -> tuple[SetUp, ...]:
     """Fit the set-up of every session anew.
 
-    `model`: with which the sessions were observed; `observed`: of `observing.observe`;
-    `calibrated`: effects among `GROUPS` that the recordings say were calibrated: they stay.  Gives
-    one for each session.
+    `calibrated`: effects among `GROUPS` that the recordings say were calibrated: they stay.
     """
     ends = np.cumsum([len(each) for each in observed.sessions])
     parts = np.split(observed.predicted, ends[:-1])

@@ -173,9 +173,8 @@ def suspected(
     noise of a size that nobody knows: so the likelihood of a mistake goes with the error that it
     leaves in the unit of the instrument, to the power of minus the numbers measured.
 
-    `model`: with which the sessions are compared; `observed`: the sessions as they were recorded,
-    and what the model predicts of them; `calibrated`: effects of the set-up that are not refitted;
-    `left`: what the units leave after the refit; `mistakes`: those that are tried.
+    `calibrated`: effects of the set-up that are not refitted; `left`: what the units leave after
+    the refit; `mistakes`: those that are tried.
     """
     before, count = left.error, _independent(left.observations)
     read = observed.sessions[0].readings

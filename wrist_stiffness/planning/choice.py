@@ -33,33 +33,13 @@ def choose(
     looked_at: int = LOOKED_AT,
     per_second: bool = True,
 ) -> list[int]:
-    """Choose settings.
+    """Choose settings, in the order of their worth; a number may be there more than once.
 
-    Parameters
-    ----------
-    grams : (m, q, q) float
-        Of each setting.
-    cost_s : (m,) float
-        Duration of each setting [s].
-    start : (q, q) float
-        Of what is measured anyway.
-    budget_s : float
-        Duration that the chosen ones may have together [s].
-    utility : callable
-        Worth of experiments; increasing.
-    enough : callable
-        Tells of a Gram matrix (q, q) whether nothing more is needed.
-    rng : numpy.random.Generator
-        Which settings are compared.
-    looked_at : int
-        How many settings are compared in each step.
-    per_second : bool
-        Whether short ones are preferred; else as few as possible are chosen.
-
-    Returns
-    -------
-    list of int
-        In the order of their worth; a number may be there more than once.
+    `grams` (m, q, q): of each setting; `cost_s` (m,): duration of each [s]; `start` (q, q): of what
+    is measured anyway; `budget_s`: duration that the chosen ones may have together [s]; `utility`:
+    worth of experiments; increasing; `enough`: tells of a Gram matrix (q, q) whether nothing more
+    is needed; `rng`: which settings are compared; `looked_at`: how many in each step; `per_second`:
+    whether short ones are preferred; else as few as possible are chosen.
     """
     chosen: list[int] = []
     total, spent = start.copy(), 0.0

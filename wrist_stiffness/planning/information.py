@@ -73,11 +73,11 @@ def whitened(
 ) -> list[Array]:
     """Whiten columns visit by visit.
 
-    Between two approaches the hidden place within the encoder's count stays the same, so all
-    dwells of a visit have that error in common.
+    Between two approaches the hidden place within the encoder's count stays the same, so all dwells
+    of a visit have that error in common.
 
-    `experiment`: with r observed rows; `twists` (n, 6, p): columns at all samples of the path [m,
-    rad]; `table`: of the wrist; `noise`: of one dwell.  Gives list of (6 rows, p): by visit.
+    `twists` (n, 6, p): columns at all samples of the path [m, rad]; `noise`: of one dwell.  Gives
+    list of (6 rows, p): by visit.
     """
     mechanism = table.mechanism
     theta = experiment.block.theta[experiment.rows]
@@ -152,8 +152,7 @@ def information(
 def carried_over(known: Information, names: Sequence[str]) -> Array:
     """Return what an experiment tells for another one in which some nuisances are set anew.
 
-    `known`: of the earlier experiment; `names`: nuisances that are refitted in each.  Gives its
-    Gram matrix (q, q), zero for those nuisances.
+    Gives its Gram matrix (q, q), zero for those nuisances.
     """
     gram, layout = known.total, known.layout
     own = np.concatenate([layout.nuisances[name] for name in names if name in layout.nuisances])
@@ -179,10 +178,9 @@ def discrimination(
 ) -> Array:
     """Return the discrimination of each goal.
 
-    `gram` (..., q, q): of one experiment or several.  `layout`: of the columns.  `goals`:
-    questions.  `before` (q, q): part of the experiments that was measured before the questions were
-    asked; only what comes on top counts.  Gives (..., g): d in standard deviations; over several
-    truths, what errs as often as they do on average.
+    `gram` (..., q, q): of one experiment or several.  `before` (q, q): part of them that was
+    measured before the questions were asked; only what comes on top counts.  Gives (..., g): d in
+    standard deviations; over several truths, what errs as often as they do on average.
     """
     squares = np.zeros((*gram.shape[:-2], len(goals)))
     for number, own in enumerate(by_truth(gram, layout, goals, before)):

@@ -44,10 +44,7 @@ class AppliedLoad:
     change_s: float  # time that it takes to put it on or to take it off [s]
 
     def wrench(self, platform: Array) -> Array:
-        """Return the wrench on the platform at O in F.
-
-        `platform` (..., 3, 3): rotation U -> F.  Gives (..., 6) [N, N m].
-        """
+        """Return the wrench at O in F, (..., 6) [N, N m], for rotations U -> F (..., 3, 3)."""
         shape = (*platform.shape[:-2], 3)
         force, moment = (
             platform @ vector if self.turns else np.broadcast_to(vector, shape)
@@ -105,11 +102,11 @@ Source = Weight | Actuator
 
 
 def read_loads(path: str | Path, gravity: Array, force_limit: float) -> tuple[Source, ...]:
-    """Read the loads that a user can apply.
+    """Read the loads that a user can apply; none where the file lists none.
 
-    `path`: a YAML file; `gravity` (3,): in F [m/s^2]; `force_limit`: largest force of the table
-    [N].  Gives empty where the file lists none.  Raises `InputError` if the file cannot be read, a
-    key is missing, unknown or wrong, a name is there twice, or a force is beyond the table's range.
+    `gravity` (3,): in F [m/s^2]; `force_limit`: largest force of the table [N].  Raises
+    `InputError` if the file cannot be read, a key is missing, unknown or wrong, a name is there
+    twice, or a force is beyond the table's range.
     """
     root = read_yaml(path, InputError)
     sources: list[Source] = []

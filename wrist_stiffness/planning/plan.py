@@ -7,11 +7,10 @@ computed again on its own path, in its own order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -25,25 +24,12 @@ from wrist_stiffness.planning.information import (
     information,
 )
 from wrist_stiffness.planning.loads_file import Source
-from wrist_stiffness.planning.pool import (
-    Setting,
-    arrange,
-    draw_settings,
-    fixed_visits,
-    moved_outward,
-    reference_pose,
-)
+from wrist_stiffness.planning.pool import arrange, draw_settings, fixed_visits, moved_outward
 from wrist_stiffness.planning.question import Question
 from wrist_stiffness.planning.refit import rivals_alike
 from wrist_stiffness.planning.signatures import signatures
-from wrist_stiffness.planning.timeline import (
-    Experiment,
-    Pace,
-    Timeline,
-    Visit,
-    run_through,
-)
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.planning.timeline import Experiment, Pace, Timeline, Visit, run_through
+from wrist_stiffness.progress import Progress, silent
 
 LONGEST_S = 3600.0
 """Of a plan between rivals for which no duration is asked [s]."""
@@ -79,38 +65,17 @@ def plan(
     question: Question,
     conditions: Conditions,
     earlier: Sequence[Experiment] = (),
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Plan:
-    """Plan an experiment.
+    """Plan an experiment that is not longer than asked for.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        What is known of the wrist.
-    question : Question
-        What is asked.
-    conditions : Conditions
-        Loads, durations, noise.
-    earlier : sequence of Experiment
-        What was measured on this wrist before, each with instruments set up anew.
-    progress : callable, optional
-        Called with (done, total).
-
-    Returns
-    -------
-    Plan
-        Not longer than asked for.
-
-    Raises
-    ------
-    InputError
-        If not even the fixed part fits into the duration.
-    LoadRangeError
-        If a load cannot be applied within the table's range.
+    `earlier`: what was measured on this wrist before, each with instruments set up anew.  Raises
+    `InputError` if not even the fixed part fits into the duration; `LoadRangeError` if a load
+    cannot be applied within the table's range.
     """
     rng = np.random.default_rng(conditions.seed)
     whole = question.goals is None
-    pool = _drawn(model, conditions, whole, rng)
+    pool = _Pool(model, conditions, whole, rng)
     seconds = LONGEST_S if conditions.seconds is None else conditions.seconds
     shortest = pool.arranged([], rng)
     if shortest.duration_s > seconds:
@@ -120,12 +85,12 @@ def plan(
             "warm-up, reference poses and two long holds take"
         )
     agree = bool(earlier and question.alike)
-    stage = _Stages(progress, 2 + len(earlier) + agree)
+    stages = _stages(progress, 2 + len(earlier) + agree)
     if agree:
-        question = rivals_alike(model, question, earlier, conditions.noise, stage.next())
-    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, stage.next())
+        question = rivals_alike(model, question, earlier, conditions.noise, next(stages))
+    known, lacking = evaluated(model, question, pool.timeline, conditions.noise, next(stages))
     question = question.without(lacking)
-    before = [evaluated(model, question, e, conditions.noise, stage.next())[0] for e in earlier]
+    before = [evaluated(model, question, e, conditions.noise, next(stages))[0] for e in earlier]
     own = aims(known, before, question, rng)
     if not own.reachable and not whole:
         return Plan(None, (), own.at_most, lacking, {})
@@ -135,13 +100,14 @@ def plan(
         own.start + pool.fixed_gram(own.pool.grams),
         seconds - shortest.duration_s,
         own.worth,
-        own.settled if conditions.seconds is None else _never,
+        # All the time that is asked for is used.
+        own.settled if conditions.seconds is None else lambda gram: False,
         rng,
         LOOKED_AT if whole else len(pool.cost_s),
         per_second=conditions.seconds is not None,
     )
     visits, timeline = pool.within(seconds, chosen, shortest, rng)
-    final = evaluated(model, question, timeline, conditions.noise, stage.next())[0]
+    final = evaluated(model, question, timeline, conditions.noise, next(stages))[0]
     gram = own.start + own.truths.of(final.total)
     return Plan(
         timeline,
@@ -152,51 +118,39 @@ def plan(
     )
 
 
-def _never(gram: Array) -> bool:
-    """Tell that no experiment is enough: all the time asked for is used."""
-    return False
+def _stages(progress: Progress, count: int) -> Iterator[Progress]:
+    """Yield the progress of each of several evaluations of about the same length."""
+    for behind in range(count):
 
+        def told(done: int, total: int, behind: int = behind) -> None:
+            progress(behind * total + done, count * total)
 
-class _Stages:
-    """One progress for several evaluations of about the same length."""
-
-    def __init__(self, progress: Progress | None, count: int) -> None:
-        self._progress, self._count, self._begun = progress, count, 0
-
-    def next(self) -> Progress:
-        """Return the progress of the next evaluation."""
-        behind = self._begun
-        self._begun += 1
-
-        def told(done: int, total: int) -> None:
-            if self._progress is not None:
-                self._progress(behind * total + done, self._count * total)
-
-        return told
+        yield told
 
 
 class _Pool:
-    """All settings, performed as one experiment, to be chosen as pairs of visits or singly."""
+    """All settings, performed as one experiment.
+
+    For a whole wrist they are chosen as pairs of visits from both sides; between rivals singly, and
+    moved outward as well.
+    """
 
     def __init__(
-        self,
-        settings: Sequence[Setting],
-        fixed: Sequence[Visit],
-        order: NDArray[np.intp],
-        pace: Pace,
-        model: ErrorModel,
-        both_sides: bool,
+        self, model: ErrorModel, conditions: Conditions, whole: bool, rng: np.random.Generator
     ) -> None:
-        self._fixed, self._pace = fixed, pace
-        self._workspace = model.table.workspace
+        workspace, pace = model.table.workspace, conditions.pace
+        self._workspace, self._pace = workspace, pace
+        settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
+        self._fixed = fixed_visits(settings, pace)
+        if not whole:
+            settings += [moved_outward(setting, workspace) for setting in settings]
         self._visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
-        self.in_unit = 2 if both_sides else 1
-        ordered = [*(self._visits[i] for i in order), *fixed]
-        reference = reference_pose(self._workspace)
-        self.timeline = run_through(ordered, self._workspace, pace, reference)
+        self.in_unit = 2 if whole else 1
+        order = rng.permutation(len(self._visits))
+        ordered = [*(self._visits[i] for i in order), *self._fixed]
+        self.timeline = run_through(ordered, workspace, pace)
         self._place = np.argsort(order)
-        visit_s = np.diff(self.timeline.ends, prepend=0.0)
-        self.cost_s = self.by_unit(visit_s)
+        self.cost_s = self.by_unit(np.diff(self.timeline.ends, prepend=0.0))
 
     def by_unit(self, of_visits: Array) -> Array:
         """Return the sums (m, ...) over the visits of each unit of values (v, ...)."""
@@ -235,25 +189,12 @@ class _Pool:
         return arrange(visits, self._fixed, self._workspace, self._pace, rng)
 
 
-def _drawn(
-    model: ErrorModel, conditions: Conditions, whole: bool, rng: np.random.Generator
-) -> _Pool:
-    """Draw settings: both sides of each for a whole wrist, moved outward as well between rivals."""
-    workspace, pace = model.table.workspace, conditions.pace
-    settings = draw_settings(workspace, conditions.sources, model.table.geometry.gravity, rng)
-    fixed = fixed_visits(settings, pace, workspace)
-    if not whole:
-        settings += [moved_outward(setting, workspace) for setting in settings]
-    order = rng.permutation(2 * len(settings))
-    return _Pool(settings, fixed, order, pace, model, both_sides=whole)
-
-
 def evaluated(
     model: ErrorModel,
     question: Question,
     experiment: Experiment,
     noise: MeasurementNoise,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> tuple[Information, dict[str, str]]:
     """Return what an experiment tells of the effects in question.
 

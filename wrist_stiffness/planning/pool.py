@@ -12,13 +12,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad, Source
-from wrist_stiffness.planning.timeline import (
-    Pace,
-    Timeline,
-    Visit,
-    run_through,
-    straight,
-)
+from wrist_stiffness.planning.timeline import HOME, Pace, Timeline, Visit, run_through, straight
 
 POOL = 100
 """Settings to choose from."""
@@ -62,55 +56,40 @@ class Setting:
         return first, second
 
 
-def reference_pose(workspace: Workspace) -> Array:
-    """Return the pose that is measured again and again: home, (2,) [rad].
-
-    Raises `InputError` if home or the way to it from either side is out of the table's domain.
-    """
-    home = np.zeros(2)
-    if not _approachable(workspace, home, home, np.ones(2)):
-        raise InputError("plan: the home pose is not inside the table's domain")
-    return home
-
-
 def draw_settings(
     workspace: Workspace, sources: Sequence[Source], gravity: Array, rng: np.random.Generator
 ) -> list[Setting]:
     """Draw the pool: random poses, without load or with one that the user can apply.
 
-    `gravity` (3,): in F [m/s^2].  Gives about `POOL`.  Raises `LoadRangeError` if a source
-    has no load within the table's range at any pose.
+    `gravity` (3,): in F [m/s^2].  Gives about `POOL`.  Raises `InputError` if home or the way to it
+    from either side is out of the table's domain; `LoadRangeError` if a source has no load within
+    the table's range at any pose.
     """
-    limits, reference = workspace.limits, reference_pose(workspace)
+    if not _approachable(workspace, HOME, np.ones(2)):
+        raise InputError("plan: the home pose is not inside the table's domain")
     # One in four settings is without load, as loads are what most effects need.
     count = POOL if sources else POOL // 2
     chosen = [
         None if i % 4 == 3 or not sources else sources[i % len(sources)] for i in range(count)
     ]
     rng.shuffle(chosen)
-    poses = _poses(workspace, count, reference, rng)
+    poses = _poses(workspace, count, rng)
     settings = []
     for theta, source in zip(poses, chosen, strict=True):
         approach = rng.choice([-1.0, 1.0], 2)
         speeds = rng.permutation([1.0, 0.5])
         carried = bool(rng.uniform() < 0.5)
-        load = (
-            None if source is None else _draw_load(source, workspace, theta, approach, gravity, rng)
-        )
-        settings.append(
-            Setting(
-                theta,
-                approach,
-                NO_LOAD if load is None else load,
-                carried and load is not None,
-                (float(speeds[0]), float(speeds[1])),
-            )
-        )
+        load = NO_LOAD
+        if source is not None:
+            load = _draw_load(source, workspace, theta, approach, gravity, rng)
+        carried = carried and load is not NO_LOAD
+        shares = float(speeds[0]), float(speeds[1])
+        settings.append(Setting(theta, approach, load, carried, shares))
     for source in sources:
         if not any(setting.load.name == source.name for setting in settings):
             raise LoadRangeError(
-                f"load {source.name}: beyond the table's range of {limits.force:g} N and "
-                f"{limits.moment:g} N m about O at every pose"
+                f"load {source.name}: beyond the table's range of {workspace.limits.force:g} N and "
+                f"{workspace.limits.moment:g} N m about O at every pose"
             )
     return settings
 
@@ -120,36 +99,35 @@ def moved_outward(setting: Setting, workspace: Workspace) -> Setting:
 
     Most effects differ most where the motors have turned far, which random poses seldom have.
     """
-    reference = reference_pose(workspace)
     nearest = float(np.linalg.norm(setting.theta))
     farthest = float(np.linalg.norm(np.abs(workspace.rectangle).max(axis=0)))
     for radius in np.linspace(farthest, nearest, OUTWARD_STEPS, endpoint=False):
         theta = setting.theta * radius / nearest
-        if _visitable(workspace, theta, reference) and within(
+        if _visitable(workspace, theta) and within(
             setting.load.wrench(_platforms(workspace, theta, setting.approach)), workspace.limits
         ):
             return replace(setting, theta=theta)
     return setting
 
 
-def _poses(workspace: Workspace, count: int, reference: Array, rng: np.random.Generator) -> Array:
+def _poses(workspace: Workspace, count: int, rng: np.random.Generator) -> Array:
     """Return poses that can be visited, (n, 2)."""
     lower, upper = workspace.rectangle
     found: list[Array] = []
     while len(found) < count:
         theta = rng.uniform(lower, upper)
-        if _visitable(workspace, theta, reference):
+        if _visitable(workspace, theta):
             found.append(theta)
     return np.array(found)
 
 
-def _visitable(workspace: Workspace, theta: Array, reference: Array) -> bool:
+def _visitable(workspace: Workspace, theta: Array) -> bool:
     """Tell whether a pose of the operative workspace can be approached from all sides."""
     tilt = TILT_SHARE * workspace.limits.operative_tilt
     if not workspace.operative(theta) or workspace.mechanism.tilt(theta) > tilt:
         return False
     sides = np.array([[1.0, 1.0], [1.0, -1.0]])
-    return all(_approachable(workspace, theta, reference, side) for side in sides)
+    return all(_approachable(workspace, theta, side) for side in sides)
 
 
 def _platforms(workspace: Workspace, theta: Array, approach: Array) -> Array:
@@ -158,12 +136,12 @@ def _platforms(workspace: Workspace, theta: Array, approach: Array) -> Array:
     return workspace.mechanism.platform_rotation(way)
 
 
-def _approachable(workspace: Workspace, theta: Array, reference: Array, side: Array) -> bool:
+def _approachable(workspace: Workspace, theta: Array, side: Array) -> bool:
     starts = [Visit(theta, sign * side).before for sign in (1.0, -1.0)]
     return all(
         straight(workspace, start, end)
         for before in starts
-        for start, end in ((reference, before), (before, theta), (theta, reference))
+        for start, end in ((HOME, before), (before, theta), (theta, HOME))
     )
 
 
@@ -174,14 +152,14 @@ def _draw_load(
     approach: Array,
     gravity: Array,
     rng: np.random.Generator,
-) -> AppliedLoad | None:
-    """Return a load that stays in the table's range on both approaches, None if none does."""
+) -> AppliedLoad:
+    """Return a load that stays in the table's range on both approaches, no load if none does."""
     platform = _platforms(workspace, theta, approach)
     for _ in range(DRAWS):
         load = source.draw(gravity, rng)
         if within(load.wrench(platform), workspace.limits):
             return load
-    return None
+    return NO_LOAD
 
 
 def within(wrench: Array, limits: Limits) -> bool:
@@ -190,15 +168,13 @@ def within(wrench: Array, limits: Limits) -> bool:
     return bool(np.all(sizes <= limits.most_load))
 
 
-def fixed_visits(settings: Sequence[Setting], pace: Pace, workspace: Workspace) -> list[Visit]:
+def fixed_visits(settings: Sequence[Setting], pace: Pace) -> list[Visit]:
     """Return what every plan has: one visit of the reference pose, and the two long holds.
 
     The holds are under the largest loads of different poses, one put on at rest and one carried
     along; without any load they watch the pose itself.
     """
-    reference = Visit(
-        reference_pose(workspace), np.ones(2), hold_s=pace.dwell_s, purpose="reference pose"
-    )
+    reference = Visit(HOME, np.ones(2), hold_s=pace.dwell_s, purpose="reference pose")
     by_size = sorted(settings, key=lambda s: -float(np.linalg.norm(s.load.force)))
     holds = [
         replace(
@@ -221,25 +197,17 @@ def arrange(
 ) -> Timeline:
     """Put chosen visits into a random order, with everything that an experiment needs besides.
 
-    `chosen`: both sides of a pose, where both are chosen, come at different times; `fixed`: of
-    `fixed_visits`; `workspace`: of the wrist; `pace`: speeds and durations; `rng`: chooses the
-    order.  Gives `Timeline`: warm-up, visits, returns to the reference pose at the beginning, in
-    between and at the end.
+    Both sides of a pose, where both are chosen, come at different times.  Gives warm-up, visits,
+    and returns to the reference pose at the beginning, in between and at the end.
     """
     reference, *holds = fixed
     visits = [chosen[i] for i in rng.permutation(len(chosen))]
     for number, hold in enumerate(holds, start=1):
         visits.insert(number * len(visits) // (len(holds) + 1), hold)
     ordered = _with_returns(visits, reference, workspace, pace)
-    measuring = run_through(ordered, workspace, pace, reference.theta).duration_s
-    share = WARM_UP_SHARE * measuring
-    return run_through(
-        ordered,
-        workspace,
-        pace,
-        reference.theta,
-        _warm_up(float(np.clip(share, WARM_UP_LEAST_S, WARM_UP_MOST_S)), workspace, pace, rng),
-    )
+    share = WARM_UP_SHARE * run_through(ordered, workspace, pace).duration_s
+    seconds = float(np.clip(share, WARM_UP_LEAST_S, WARM_UP_MOST_S))
+    return run_through(ordered, workspace, pace, _warm_up(seconds, workspace, pace, rng))
 
 
 def _with_returns(
@@ -248,7 +216,7 @@ def _with_returns(
     """Return the visits with the reference at both ends and as often as needed in between."""
     ordered = [reference]
     since_s = 0.0
-    ends = run_through([reference, *visits], workspace, pace, reference.theta).ends
+    ends = run_through([reference, *visits], workspace, pace).ends
     for visit, lasts_s in zip(visits, np.diff(ends), strict=True):
         if since_s > 0.0 and since_s + lasts_s > REFERENCE_EVERY_S:
             ordered.append(reference)
@@ -262,9 +230,8 @@ def _warm_up(
     seconds: float, workspace: Workspace, pace: Pace, rng: np.random.Generator
 ) -> list[Array]:
     """Return poses (2,) to move through for a time [rad]."""
-    reference = reference_pose(workspace)
-    poses = _poses(workspace, 8, reference, rng)
-    way, spent = [reference], 0.0
+    poses = _poses(workspace, 8, rng)
+    way, spent = [HOME], 0.0
     while spent < seconds:
         target = poses[len(way) % len(poses)]
         spent += pace.move_s(way[-1], target)

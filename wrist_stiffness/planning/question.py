@@ -68,25 +68,11 @@ def between(
 ) -> Question:
     """Ask which member of each class is the true one, and whether silent effects are there.
 
-    Parameters
-    ----------
-    classes : sequence of sequences of Effect
-        Rivals; the first of each class with the values that the diagnosis found, or at its prior
-        means where it found them in other coordinates.
-    silent : sequence of Effect
-        What the diagnosis could not have seen; what is always refitted is no question of its own.
-    rng : numpy.random.Generator
-        Draws plausible values.
-
-    Returns
-    -------
-    Question
-        The best member of every other class is refitted as well.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to ask.
+    `classes`: rivals; the first of each class with the values that the diagnosis found, or at its
+    prior means where it found them in other coordinates; `silent`: what the diagnosis could not
+    have seen; what is always refitted is no question of its own; `rng`: draws plausible values.
+    The best member of every other class is refitted as well.  Raises `InputError` if there is
+    nothing to ask.
     """
     rivals: dict[str, tuple[Effect, ...]] = {}
     goals = []

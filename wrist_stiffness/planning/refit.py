@@ -12,15 +12,11 @@ from scipy.optimize import least_squares
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.planning.information import (
-    FREE,
-    MeasurementNoise,
-    whitened,
-)
+from wrist_stiffness.planning.information import FREE, MeasurementNoise, whitened
 from wrist_stiffness.planning.question import SESSION, TARE, Question
 from wrist_stiffness.planning.signatures import Signature, signatures
 from wrist_stiffness.planning.timeline import Experiment
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 
 EVALUATIONS = 20
 """Of the model at most; a fit nearby is good enough to plan from."""
@@ -106,7 +102,7 @@ def rivals_alike(
     question: Question,
     earlier: Sequence[Experiment],
     noise: MeasurementNoise,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Question:
     """Return the question with each rival as what would have left what the first one has left.
 
@@ -128,6 +124,5 @@ def rivals_alike(
         ]
         for place, name in enumerate(members[1:], start=1):
             by_name[name] = (fitted(model, data, by_name[name][0], question.free, noise),)
-            if progress is not None:
-                progress(number * len(members) + place, len(question.alike) * len(members))
+            progress(number * len(members) + place, len(question.alike) * len(members))
     return replace(question, effects=tuple(by_name.values()))

@@ -40,23 +40,22 @@ class Rivals:
     # (2,), root mean square of shift and rotation that noise leaves [m, rad]
     floor: tuple[float, float]
 
-    def noise(self, table: Table) -> MeasurementNoise:
-        """Return the noise of one dwell: the floor without the hidden encoder count."""
-        step = table.geometry.limits.encoder_step
-        mechanism = table.mechanism
-        jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
-        shift, rotation = (value**2 for value in self.floor)
-        hidden = float(np.sum(jacobian**2)) * step**2 / 12.0
-        white = np.array([shift, max(rotation - hidden, LEAST_WHITE * rotation)])
-        return MeasurementNoise(np.repeat(np.sqrt(white / 3.0), 3), step)
+
+def dwell_noise(table: Table, floor: tuple[float, float]) -> MeasurementNoise:
+    """Return the noise of one dwell: the floor of `Rivals` without the hidden encoder count."""
+    step, mechanism = table.geometry.limits.encoder_step, table.mechanism
+    jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
+    shift, rotation = (value**2 for value in floor)
+    hidden = float(np.sum(jacobian**2)) * step**2 / 12.0
+    white = np.array([shift, max(rotation - hidden, LEAST_WHITE * rotation)])
+    return MeasurementNoise(np.repeat(np.sqrt(white / 3.0), 3), step)
 
 
 def read_rivals(path: str | Path) -> Rivals:
     """Read the result of `diagnose --json`.
 
-    `path`: JSON file.  Gives `Rivals`: classes, silent effects and noise floor.  Raises
-    `InputError` if the file cannot be read, a key is missing or wrong, or an effect is not of the
-    catalogue.
+    Raises `InputError` if the file cannot be read, a key is missing or wrong, or an effect is not
+    of the catalogue.
     """
     found = DIAGNOSIS(read_json(path, InputError))
     floor, silent = found["noise"], found["not_excited"]

@@ -13,7 +13,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.progress import Progress
+from wrist_stiffness.progress import Progress, silent
 
 STEP = 0.1
 """Step of a difference, in plausible sizes; a law linear in its parameters is taken at full size
@@ -42,35 +42,33 @@ class Signature:
 
 def plausible(effect: Effect, rng: np.random.Generator) -> Effect:
     """Return an effect with values drawn where its parameters would not surprise."""
-    return effect.with_values({p.key: _plausible(p, rng) for p in effect.parameters})
-
-
-def _plausible(parameter: Parameter, rng: np.random.Generator) -> float:
-    size = parameter.scale * rng.uniform(0.5, 1.5)
-    down = parameter.mean - size >= parameter.lower and rng.uniform() < 0.5
-    return float(np.clip(parameter.mean + (-size if down else size), None, parameter.upper))
+    values = {}
+    for each in effect.parameters:
+        size = each.scale * rng.uniform(0.5, 1.5)
+        down = each.mean - size >= each.lower and rng.uniform() < 0.5
+        values[each.key] = float(np.clip(each.mean + (-size if down else size), None, each.upper))
+    return effect.with_values(values)
 
 
 def signatures(
     model: ErrorModel,
     block: Block,
     candidates: Sequence[Sequence[Effect]],
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> list[Signature]:
     """Evaluate what effects would leave.
 
     `model`: without them, or with them at other values.  `block`: the experiment's path.
     `candidates`: each effect at one or more sets of values; the differences are taken at the first.
-    `progress`: called with (done, total).  Gives one for each.  Raises `InputError` if a sample
-    lies outside the table's domain or load range.
+    Gives one for each.  Raises `InputError` if a sample lies outside the table's domain or load
+    range.
     """
     if model.evaluation == "spline":
         model = model.with_evaluation("closed_form")
     found = []
     for number, sets in enumerate(candidates):
         found.append(_signature(model, block, sets))
-        if progress is not None:
-            progress(number + 1, len(candidates))
+        progress(number + 1, len(candidates))
     return found
 
 

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad
+from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.sessions.units import COUNTS
+
+HOME = np.zeros(2)
+"""The reference pose, which is measured again and again [rad]."""
 
 LEAD_S = 5.0
 """Time to come to the reference pose from wherever the motors stand [s]."""
@@ -119,34 +127,28 @@ def straight(workspace: Workspace, start: Array, end: Array) -> bool:
 
 
 def run_through(
-    visits: Sequence[Visit],
-    workspace: Workspace,
-    pace: Pace,
-    reference: Array,
-    warm_up: Sequence[Array] = (),
+    visits: Sequence[Visit], workspace: Workspace, pace: Pace, warm_up: Sequence[Array] = ()
 ) -> Timeline:
-    """Perform visits one after the other, from rest without load at the reference pose.
+    """Perform visits in their order, from rest without load at home and back to it.
 
-    `visits`: in their order.  `workspace`: moves stay in it; where a straight one would not, it
-    goes by way of the reference pose.  `pace`: speeds and durations.  `reference` (2,): motor
-    angles [rad].  `warm_up` sequence of (2,): poses to move through first without measuring [rad].
-    Gives `Timeline`: ends without load in the reference pose.
+    Where a straight move would not stay in the workspace, it goes by way of home.  `warm_up`: poses
+    (2,) to move through first without measuring [rad].
     """
-    clock = _Clock(workspace, pace, reference)
+    clock = _Clock(workspace, pace)
     for theta in warm_up:
         clock.travel(theta)
     for number, visit in enumerate(visits):
         clock.visit(number, visit)
-    clock.travel(reference)
+    clock.travel(HOME)
     return clock.timeline()
 
 
 class _Clock:
     """Performs one thing after the other."""
 
-    def __init__(self, workspace: Workspace, pace: Pace, reference: Array) -> None:
-        self._workspace, self._pace, self._reference = workspace, pace, reference
-        self._time_s, self._theta, self._load = 0.0, np.asarray(reference, dtype=float), NO_LOAD
+    def __init__(self, workspace: Workspace, pace: Pace) -> None:
+        self._workspace, self._pace = workspace, pace
+        self._time_s, self._theta, self._load = 0.0, HOME, NO_LOAD
         self._samples: list[tuple[float, Array, Array, AppliedLoad]] = []
         self._observed: list[tuple[int, int, bool]] = []
         self._dwells: list[tuple[float, Visit, AppliedLoad, Array, float, str]] = []
@@ -158,7 +160,7 @@ class _Clock:
 
     def travel(self, theta: Array) -> None:
         direct = straight(self._workspace, self._theta, theta)
-        for target in (theta,) if direct else (self._reference, theta):
+        for target in (theta,) if direct else (HOME, theta):
             self._move(target, 1.0)
 
     def visit(self, number: int, visit: Visit) -> None:
@@ -242,3 +244,25 @@ class _Clock:
             self._observed.append((at, number, False))
         self._time_s = begin + hold_s
         self._knot()
+
+
+def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
+    """Return where and when a session measured, a row for each dwell and each moment in motion.
+
+    Dwells between which no motor moved belong to one visit.  Raises `InputError` if no measurement
+    lies in the table's domain and load range, or gauges measured.
+    """
+    if session.readings is not None:
+        raise InputError(f"{session.name}: readings of gauges; plans are made for measured poses")
+    parts = as_units(model, session).cut
+    in_unit = np.flatnonzero(parts.unit >= 0)
+    # The heaviest moment of each unit stands for its mean.
+    order = in_unit[np.lexsort((parts.weight[in_unit], parts.unit[in_unit]))]
+    last = np.append(np.diff(parts.unit[order]) != 0, True)
+    rows = order[last]
+    moving = ~parts.dwell[parts.unit[rows]]
+    limit = COUNTS * model.table.geometry.limits.encoder_step
+    turned = np.any(np.abs(np.diff(parts.block.theta, axis=0)) > limit, axis=1)
+    motions = np.append(0, np.cumsum(turned))[rows]
+    visit = np.unique(motions, return_inverse=True)[1]
+    return Experiment(replace(parts.block, theta_dot=parts.speed), rows, visit, moving)

@@ -9,22 +9,8 @@ import numpy as np
 from wrist_stiffness.comparing.comparison import ComparedModel, lengths
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.inference import Quantity
-from wrist_stiffness.report.page import (
-    Bullets,
-    Page,
-    Part,
-    Section,
-    Table,
-    Text,
-    drawn,
-)
-from wrist_stiffness.report.parts import (
-    against,
-    number,
-    provenance_section,
-    typeset,
-    unit_of,
-)
+from wrist_stiffness.report.page import Bullets, Page, Part, Section, Table, Text, drawn
+from wrist_stiffness.report.parts import number, provenance_section, typeset, unit_of
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars, draw_map, draw_time_line
 
@@ -55,10 +41,7 @@ HOW = (
 
 
 def report_of_comparison(compared: Compared) -> Page:
-    """Return the report of a comparison.
-
-    `compared`: of `commands.compare.compare`.
-    """
+    """Return the report of a comparison."""
     found = compared.comparison
     models = ", ".join(model.name for model in found.models)
     units = found.models[0].refitted.n_units
@@ -173,8 +156,7 @@ def _depends(compared: Compared) -> tuple[Part, ...]:
             "95 % band. On a map the fields are the law and the dots what was measured. Squares "
             "are means of what the other models leave."
         )
-        pictures = [against(each.curve, each.name, shown) for each in told]
-        parts.append(drawn(draw_against(pictures), caption))
+        parts.append(drawn(draw_against(told, shown), caption))
     return tuple(parts)
 
 

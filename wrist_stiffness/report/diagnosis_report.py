@@ -15,23 +15,8 @@ from wrist_stiffness.report.diagnosis_lines import (
     rest_lines,
     verdict_lines,
 )
-from wrist_stiffness.report.page import (
-    Bullets,
-    Page,
-    Part,
-    Section,
-    Table,
-    Text,
-    drawn,
-)
-from wrist_stiffness.report.parts import (
-    against,
-    number,
-    plus_minus,
-    provenance_section,
-    typeset,
-    unit_of,
-)
+from wrist_stiffness.report.page import Bullets, Page, Part, Section, Table, Text, drawn
+from wrist_stiffness.report.parts import number, plus_minus, provenance_section, typeset, unit_of
 from wrist_stiffness.report.pictures.dependence import draw_against
 from wrist_stiffness.report.pictures.errors import Bars, draw_bars
 
@@ -163,10 +148,9 @@ def _depends(found: Diagnosed, left: Explained) -> tuple[Part, ...]:
     if found.result.findings:
         after = left.observations.with_values(found.answer.fitted.residual)
         series.append(("with the findings", after))
-    pictures = [against(each.curve, each.name, series) for each in left.told[:MOST_PICTURED]]
     parts.append(
         drawn(
-            draw_against(pictures),
+            draw_against(left.told[:MOST_PICTURED], series),
             "What the refitted base leaves against the conditions that show it best, everything "
             "else that was found taken out: every dwell and half second in motion, and the fitted "
             "law with its 95 % band.",

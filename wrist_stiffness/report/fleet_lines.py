@@ -9,10 +9,10 @@ from wrist_stiffness.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.report.parts import TITLES
 
 if TYPE_CHECKING:
-    from wrist_stiffness.commands.fleet import FleetRow
+    from wrist_stiffness.commands.fleet import Row
 
 Values = dict[str, Any]
-Rows: TypeAlias = "Sequence[FleetRow[Values]]"
+Rows: TypeAlias = "Sequence[Row]"
 
 
 POSE = ("s_um", "phi_mdeg")
@@ -52,14 +52,16 @@ def _table(
     mistakes: Callable[[Values], Sequence[str]],
 ) -> list[str]:
     """Return a line for each recording, and below the mistakes of the set-up."""
-    wide = max([len("recording"), *(len(str(row.path)) for row in rows)])
+    wide = max([len("recording"), *(len(str(row.item)) for row in rows)])
     out, below = [f"{'recording':{wide}}{titles}"], []
     for row in rows:
         if row.result is None:
-            out.append(f"{row.path!s:{wide}}  not {undone}: {row.reason}")
+            # The path stands before it already.
+            why = row.error.removeprefix(f"{row.item}: ").removeprefix(f"{row.item} ")
+            out.append(f"{row.item!s:{wide}}  not {undone}: {why}")
             continue
-        out.append(f"{row.path!s:{wide}}{cells(row.result)}")
-        below += [f"{row.path}: {sentence}" for sentence in mistakes(row.result)]
+        out.append(f"{row.item!s:{wide}}{cells(row.result)}")
+        below += [f"{row.item}: {sentence}" for sentence in mistakes(row.result)]
     return [*out, *(["", *below] if below else [])]
 
 

@@ -126,10 +126,7 @@ def html_of(page: Page) -> str:
 
 
 def write_page(path: str | Path, page: Page) -> None:
-    """Write a page, complete or not at all.
-
-    Raises `InputError` if the file cannot be written.
-    """
+    """Write a page, complete or not at all (InputError if that fails)."""
     with writing(path) as written:
         # A file's name may be no text: its bytes are shown by their numbers.
         written.write_text(html_of(page), encoding="utf-8", errors="backslashreplace")

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isnan
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wrist_stiffness.comparing.curve import Curve
-from wrist_stiffness.inference import Observations
 from wrist_stiffness.report.page import Section, Table, Text
-from wrist_stiffness.report.pictures.dependence import Against
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.provenance import Provenance
@@ -54,33 +50,6 @@ def plus_minus(value: float, sigma: float) -> str:
     if np.isfinite(sigma) and sigma > 0.0:
         digits = min(max(1 - int(np.floor(np.log10(sigma))), 0), 9)
     return f"{round(value, digits) + 0.0:.{digits}f} +- {sigma:.{digits}f}"
-
-
-def against(curve: Curve, title: str, models: Sequence[tuple[str, Observations]] = ()) -> Against:
-    """Return what a picture needs of one dependence.
-
-    `models`: name and residuals of further models over the same units, shown along the same
-    direction.
-    """
-    columns = list(curve.quantity.components)
-    used = curve.direction != 0.0
-    others = [
-        (name, left.values[:, columns][:, used] @ curve.direction[used] * curve.quantity.per_si)
-        for name, left in models
-    ]
-    label = f"{curve.quantity.name} {curve.where} [{unit_of(curve.quantity.unit)}]"
-    labels = tuple(typeset(each) for each in curve.labels)
-    return Against(
-        title,
-        labels,
-        label,
-        curve.values,
-        curve.measured,
-        curve.places,
-        curve.mean,
-        curve.sigma,
-        others,
-    )
 
 
 def provenance_section(provenance: Provenance) -> Section:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from wrist_stiffness.lookup.table import Table
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.modes import ModeSummary
-    from wrist_stiffness.commands.table import MapSummary
 
 
 def fact_lines(table: Table) -> list[str]:
@@ -19,14 +18,14 @@ def fact_lines(table: Table) -> list[str]:
     return [f"{name + ':':26} {text}" for name, text in facts(table)]
 
 
-def load_lines(summary: MapSummary) -> list[str]:
+def load_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return what the rated load does."""
     lines = ["rated load (1 N downward, own weight left out), operative workspace:"]
     lines += [
         f"  {name:12} mean {row['mean']:7.2f}   min {row['min']:7.2f}   max {row['max']:7.2f}"
-        for name, row in summary.operative.items()
+        for name, row in summary["operative"].items()
     ]
-    largest = summary.domain_max
+    largest = summary["domain_max"]
     lines.append(
         f"whole map: s up to {largest['s_um']:.3g} um, phi up to {largest['phi_mdeg']:.3g} mdeg"
     )

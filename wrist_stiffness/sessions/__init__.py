@@ -1,4 +1,1 @@
-"""A measuring campaign on one wrist: from recordings to what the statistics of `diagnosis` need.
-
-This room knows the wrist, its model and its recordings; `diagnosis` knows none of them.
-"""
+"""A measuring campaign on one wrist: from recordings to units with their conditions."""

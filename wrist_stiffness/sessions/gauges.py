@@ -7,7 +7,7 @@ tracker is the special case in which the rows are those of the identity.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -111,17 +111,6 @@ class Gauge:
         return Gauge(self.name, along, self.point + POINT_M * step[1:4]), ZERO_M * float(step[0])
 
 
-def quantities_of(gauges: Sequence[Gauge]) -> tuple[Quantity, ...]:
-    """Return what is reported as one length: dial gauges together, and inclinometers."""
-    tilts = tuple(n for n, each in enumerate(gauges) if each.point is None)
-    lengths = tuple(n for n in range(len(gauges)) if n not in tilts)
-    return tuple(
-        replace(quantity, components=own, called=tuple(gauges[n].name for n in own))
-        for quantity, own in ((GAUGES, lengths), (TILTS, tilts))
-        if own
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Readings:
     """What gauges read of n samples."""
@@ -133,8 +122,14 @@ class Readings:
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What is reported as one length."""
-        return quantities_of(self.gauges)
+        """What is reported as one length: dial gauges together, and inclinometers."""
+        tilts = tuple(n for n, each in enumerate(self.gauges) if each.point is None)
+        lengths = tuple(n for n in range(len(self.gauges)) if n not in tilts)
+        return tuple(
+            replace(quantity, components=own, called=tuple(self.gauges[n].name for n in own))
+            for quantity, own in ((GAUGES, lengths), (TILTS, tilts))
+            if own
+        )
 
     def take(self, rows: slice | NDArray[np.bool_]) -> Readings:
         """Return those of some samples, in their order."""

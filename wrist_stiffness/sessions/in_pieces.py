@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.mechanism.components import Array
+
 ROWS = 20_000
 """Rows of a piece: some rotation matrices of each fit into a processor's cache."""
 
@@ -18,3 +21,8 @@ def in_pieces(function: Callable[..., NDArray[Any]], *arrays: NDArray[Any]) -> N
     return np.concatenate(
         [function(*(each[start : start + ROWS] for each in arrays)) for start in starts]
     )
+
+
+def rigid_rotation(table: Table, theta: Array) -> Array:
+    """Return the rotation U -> F of the rigid platform, (n, 3, 3), at reachable angles (n, 2)."""
+    return in_pieces(table.mechanism.platform_rotation, theta)

@@ -52,11 +52,10 @@ def without_mounting(table: Observations, values: Array) -> Array:
 
 
 def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
-    """Compare a model with what was measured, unit by unit.
+    """Compare a model with sessions in the order of time, unit by unit.
 
-    `sessions`: in the order of time.  Gives `Observed`: only of units that lie in the table's
-    domain and load range.  Raises `InputError` if there is no session, nothing of one lies in the
-    model's range, or no unit was measured.
+    Only units in the table's domain and load range count.  Raises `InputError` if there is no
+    session, nothing of one lies in the model's range, or no unit was measured.
     """
     if not sessions:
         raise InputError("no session to compare the model with")

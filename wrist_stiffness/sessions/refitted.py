@@ -32,7 +32,7 @@ look nearly like it.
 
 A gap is free here by the prior of its law, tens of micrometres: a calibration describes whatever
 wrist stands there.  A diagnosis, and the fit of what it names, hold it to what shims leave
-(`fitting.free_effects`), because a flange that stands otherwise is a fault to be named."""
+(`identification.free_effects`), because a flange that stands otherwise is a fault to be named."""
 
 ANSWERS_LOAD = frozenset({"link_stiffness", "bushing_stiffness", "load_scale"})
 """Those of the tolerances that say how much a load does."""

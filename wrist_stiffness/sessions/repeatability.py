@@ -8,7 +8,6 @@ import numpy as np
 
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.inference.noise import replicate_variance
-from wrist_stiffness.mechanism.components import Array
 
 FEWEST_REPEATS = 6
 """Degrees of freedom from which a repeatability is told."""
@@ -24,15 +23,10 @@ def by_side(observations: Observations) -> Observations:
     return replace(observations, replicate=np.where(observations.replicate >= 0, label, -1))
 
 
-def scatter_of_repeats(observations: Observations) -> tuple[Array, float]:
-    """Variance of a component inside groups of replicates, (m,), and its degrees of freedom."""
-    values = np.where(observations.measured, observations.values, 0.0)
-    return replicate_variance(values, np.empty((*values.shape, 0)), observations)
-
-
 def repeatability(observations: Observations) -> dict[str, float]:
     """Scatter (RMS) of repeated dwells by the key of the quantity; empty with too few."""
-    variance, freedom = scatter_of_repeats(observations)
+    values = np.where(observations.measured, observations.values, 0.0)
+    variance, freedom = replicate_variance(values, np.empty((*values.shape, 0)), observations)
     if freedom < FEWEST_REPEATS:
         return {}
     # Of a component that was never measured the variance is called 1, which is a metre.

@@ -10,11 +10,7 @@ from wrist_stiffness.sessions.in_pieces import in_pieces
 
 
 def beyond_range(table: Table, block: Block) -> list[str]:
-    """Say which limits of a table measurements exceed.
-
-    `table`: has the domain and the largest load; `block`: samples [rad, N, N m].  Gives one text
-    for each limit: how many samples, how far, the limit.
-    """
+    """Say which limits of a table samples exceed: how many, how far, and the limit."""
     limits, of = table.geometry.limits, len(block)
     out = []
     for name, columns, limit, unit in (

@@ -106,9 +106,7 @@ class UnitSession:
 
     def seen(self, twist: Array) -> Array:
         """Return what the instrument shows of small twists at O, (..., u, 6) -> (..., u, m)."""
-        if self.readings is None:
-            return twist
-        return np.asarray((self._rows @ twist[..., None])[..., 0])
+        return self.columns_seen(twist[..., None])[..., 0]
 
     def columns_seen(self, twists: Array) -> Array:
         """Return the same of columns of twists, (u, 6, k) -> (u, m, k)."""
@@ -240,9 +238,8 @@ class UnitSession:
 def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     """Cut a session into units and average what was measured.
 
-    Measurements outside the model's domain or load range belong to no unit.
-
-    Raises `InputError` if none lies in it; the message names the limits.
+    Measurements outside the model's domain or load range belong to no unit.  Raises `InputError`
+    with the limits if none lies in it.
     """
     accepted = model.accepts(session.block)
     if not accepted.any():

@@ -102,7 +102,10 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
     # Moments that only tell the path between two poses do not make these denser.
     step = float(np.median(np.diff(block.time[measured]))) if measured.sum() > 1 else np.inf
     sparse = step > SPARSE_S
-    before, after = _windows(block.time, max(WINDOW_S, 1.5 * step) if not sparse else 0.0)
+    width = max(WINDOW_S, 1.5 * step) if not sparse else 0.0
+    # The first sample of the window before each sample, and the end of the one after.
+    before = np.searchsorted(block.time, block.time - width, side="left")
+    after = np.searchsorted(block.time, block.time + width, side="right")
     turning = _changes(block.theta, before, after, np.full(2, COUNTS * encoder_step), 0.0)
     loading = _changes(block.load, before, after, *_load_tolerance(block.load))
     mean_speed = np.zeros((n, 2)) if sparse else _speed(block, before, after)
@@ -130,13 +133,6 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
         last_load > last_turn,
         sense,
     )
-
-
-def _windows(time: Array, width: float) -> tuple[Labels, Labels]:
-    """Return the first sample of the window before each sample and the end of the one after."""
-    first = np.searchsorted(time, time - width, side="left")
-    end = np.searchsorted(time, time + width, side="right")
-    return first, end
 
 
 def _window_means(values: Array, first: Labels, end: Labels) -> Array:

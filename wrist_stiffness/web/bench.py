@@ -7,6 +7,7 @@ import signal
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event
 from pathlib import Path
@@ -15,9 +16,17 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import Analysis, Version
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.commands.diagnose import Diagnosed
 from wrist_stiffness.commands.extend import FormulaEffect
 from wrist_stiffness.commands.import_csv import import_csv
-from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
+from wrist_stiffness.commands.provenance import Provenance
+from wrist_stiffness.commands.read_sessions import (
+    Recordings,
+    read_sessions,
+    recording_sha256,
+    was_fitted_to,
+)
 from wrist_stiffness.comparing.comparison import Comparison
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.comparing.sentences import sentences
@@ -27,15 +36,16 @@ from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
 from wrist_stiffness.inference.giving import told
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
 from wrist_stiffness.planning.loads_file import Weight
 from wrist_stiffness.planning.plan import Conditions
-from wrist_stiffness.planning.rivals import Rivals
+from wrist_stiffness.planning.rivals import dwell_noise
 from wrist_stiffness.planning.timeline import Pace
-from wrist_stiffness.report.plan_folder import write_plan
+from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
+from wrist_stiffness.report.page import write_page
+from wrist_stiffness.report.plan import plan_summary, write_plan
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.web.examples import EXAMPLES, recordings_of
-from wrist_stiffness.web.results import as_commands, told_plan, write_result
 from wrist_stiffness.web.workspace import Workspace
 
 USUAL_PACE = Pace(float(np.radians(30.0)), 2.0, True)
@@ -145,7 +155,7 @@ class Bench:
             return path
         folder = self._workspace.folder / ".imported"
         folder.mkdir(exist_ok=True)
-        return import_csv(path, folder / f"{path.stem}.mcap", overwrite=True).path
+        return import_csv(path, folder / f"{path.stem}.mcap", overwrite=True).recording
 
     def _open(self, paths: Sequence[Path], model: Path) -> Changes:
         self._tell("reading")
@@ -256,11 +266,9 @@ class Bench:
             )
         floor = 1e-6 * noise["s_um"], float(np.radians(1e-3 * noise["phi_mdeg"]))
         weight = Weight(f"{grams:g} g", 1e-3 * grams, table.geometry.load_point, HANG_S)
-        conditions = Conditions(
-            (weight,), USUAL_PACE, Rivals((), (), floor).noise(table), None, seed=0
-        )
+        conditions = Conditions((weight,), USUAL_PACE, dwell_noise(table, floor), None, seed=0)
         found = analysis.plan(rivals, conditions)
-        text = told_plan(found)
+        text = plan_summary(found)
         if found.timeline is None:
             return {"planned": (text, "")}
         name = self._workspace.free("next_experiment")
@@ -270,10 +278,35 @@ class Bench:
     def export(self, number: int) -> Changes:
         """Write a version's model, the report of the last diagnosis and the same as commands."""
         self._tell("writing model, report and commands")
-        model = self._opened.versions[number].model
-        lines = as_commands(self._model, self._paths, self._options)
-        asked = self._model, self._paths, self._answer
-        return {"written": write_result(self._workspace, model, lines, *asked)}
+        name = self._workspace.free("wrist")
+        files = {f"{name}.yaml": "model", f"{name}.txt": "commands that do the same"}
+        model, commands = map(self._workspace.path, files)
+        save_model(self._opened.versions[number].model, model)
+        with replacing(commands) as path:
+            path.write_text("\n".join(self._commands()) + "\n", encoding="utf-8")
+        if self._answer is not None:
+            files[f"{name}.html"] = "report of the diagnosis"
+            hashes = {path.name: recording_sha256(path) for path in self._paths}
+            date = datetime.now(UTC).isoformat(timespec="seconds")
+            parent = {self._model.stem: file_sha256(self._model)}
+            provenance = Provenance("wrist-stiffness workbench", date, parent, hashes)
+            answered = Diagnosed(self._answer, tuple(hashes), "", (), provenance)
+            write_page(self._workspace.path(f"{name}.html"), report_of_diagnosis(answered))
+        return {"written": tuple(files.items())}
+
+    def _commands(self) -> list[str]:
+        """Return what a terminal would do the same with."""
+        days = shlex.join(str(path) for path in self._paths)
+        model = shlex.quote(str(self._model))
+        extensions = (
+            f"wrist-stiffness extend step_{n}.yaml {option} --fit {days} -o step_{n + 1}.yaml"
+            for n, option in enumerate(self._options, 1)
+        )
+        return [
+            f"wrist-stiffness calibrate {model} --fit {days} -o step_1.yaml",
+            f"wrist-stiffness diagnose {days} --model step_1.yaml",
+            *extensions,
+        ]
 
     def undo(self) -> Changes:
         """Take the newest version back."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from wrist_stiffness.analysis import View
 from wrist_stiffness.comparing.curve import Curve, condition_label, condition_shown
 from wrist_stiffness.inference.observations import Labels, Mask, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.report.pictures.palette import COLOURS, FLOOR
+from wrist_stiffness.report.pictures.figure import COLOURS, FLOOR
 from wrist_stiffness.web.bench import Row
 
 Figure = dict[str, Any]
@@ -114,10 +113,7 @@ def minutes(table: Observations) -> Array:
 
 
 def error_map(shown: Shown, border: Array) -> Figure:
-    """Return the error over both motor angles.
-
-    `border` (n, 2): border of the operative workspace [rad].
-    """
+    """Return the error over both motor angles, with the workspace's border (n, 2) [rad]."""
     table = shown.view.left
     left = table.values if shown.after is None else shown.after
     size = length(left, shown.quantity)
@@ -197,14 +193,11 @@ def time_line(shown: Shown) -> Figure:
 
 
 def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
-    """Return what is left against one condition, with the law that the comparison found.
-
-    `told`: of the comparison, where it is of this condition and version.
-    """
+    """Return what is left against one condition, with the law that the comparison found."""
     table, part, label = shown.view.left, shown.part, shown.part_label
     if told is not None and len(told.measured) == table.n_units:
         label = f"{SYMBOL[told.quantity.name]} {told.where} [{unit_of(told.quantity)}]"
-        part = partial(_along, told)
+        part = told.along
     else:
         told = None
     values = condition_shown(table, condition) if told is None else told.values[:, 0]
@@ -255,12 +248,6 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     figure["layout"]["xaxis"] |= {"range": [0.0, top]}
     figure["layout"]["yaxis"] |= {"autorange": "reversed", "automargin": True}
     return figure
-
-
-def _along(told: Curve, values: Array) -> Array:
-    """Return the part of (u, 6) values along the way of a curve, in the unit of its quantity."""
-    columns = values[:, list(told.quantity.components)]
-    return np.asarray(columns @ told.direction * told.quantity.per_si)
 
 
 def _angles(table: Observations) -> Array:

@@ -25,10 +25,7 @@ UPLOAD = """
 
 
 class OpenPanel:
-    """The panel of one tab.
-
-    `largest`: of an upload [bytes].
-    """
+    """The panel of one tab; `largest`: of an upload [bytes]."""
 
     def __init__(self, tab: Tab, largest: int) -> None:
         self._tab = tab

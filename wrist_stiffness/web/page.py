@@ -52,10 +52,7 @@ START = (
 
 
 def build_page(workspace: Workspace, largest: int) -> None:
-    """Build the page of one tab.
-
-    `largest`: of an upload [bytes].
-    """
+    """Build the page of one tab; `largest`: of an upload [bytes]."""
     tab = Tab(workspace)
     ui.add_css(STYLE)
     ui.add_body_html(f"<script>{FOCUS}</script>")

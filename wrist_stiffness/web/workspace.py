@@ -23,10 +23,7 @@ NAME = re.compile(r"[\w][\w .+-]{0,99}")
 
 
 class Workspace:
-    """A folder, beyond which no name from a page leads.
-
-    `folder`: made where it is not there.
-    """
+    """A folder, made where it is not there, beyond which no name from a page leads."""
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder).resolve()
@@ -36,10 +33,7 @@ class Workspace:
             raise InputError(f"{folder}: cannot be made: {error.strerror}") from error
 
     def path(self, name: str) -> Path:
-        """Return the path of a name in the folder.
-
-        Raises `InputError` if it is no plain file name, or leads out of the folder.
-        """
+        """Return the path of a plain file name in the folder (InputError if it is none)."""
         path = self.folder / name
         if not NAME.fullmatch(name) or path.resolve().parent != self.folder:
             raise InputError(f"{name!r} is no plain file name within the workspace")
@@ -72,10 +66,7 @@ class Workspace:
         return next(own for n in count(1) if (own := f"{name}_{n}") not in taken)
 
     def save(self, name: str, content: bytes) -> Path:
-        """Write an uploaded file; one of that name is replaced.
-
-        Raises `InputError` if the name or its ending is refused, or a folder has the name.
-        """
+        """Write an uploaded file in place of an older one (InputError if its name is refused)."""
         path = self.path(name)
         if path.suffix.lower() not in TAKEN:
             raise InputError(

@@ -6,13 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.commands.budget import Push
-from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.commands.budget import Push, load_alone
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, Array
-from wrist_stiffness.mechanism.energy import strain_energies
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.report.pictures.bent_wrist import Shape, bent_shapes, round_down
 from wrist_stiffness.web.figures import MAP, RED, Figure
 
@@ -41,7 +38,7 @@ def wrist_figure(
     """
     push = Push(load[:3], load[3:], np.zeros(3))
     shapes = bent_shapes(table, theta, push)
-    share = 100.0 * _shares(table, theta, load)
+    share = 100.0 * load_alone(table, table.workspace.configuration(theta), load)[1]
     top = max(float(share.max()), 1.0)
     platform = shapes[-1]
     moved = [np.linalg.norm(shape.shift, axis=-1).max() for shape in shapes]
@@ -73,15 +70,6 @@ def wrist_figure(
     }
     config = {"displaylogo": False, "modeBarButtonsToRemove": REMOVED}
     return {"data": traces, "layout": layout, "config": config}, exaggeration
-
-
-def _shares(table: Table, theta: Array, load: Array) -> Array:
-    """Return the part of the load's strain energy by component, (8,), 0 without a load."""
-    at = table.workspace.configuration(theta)
-    response = respond(contact_operators(at, table.components, np.zeros(3)), load)
-    energy = strain_energies(at, table.components, load, response.force)
-    total = float(energy.sum())
-    return np.asarray(energy / total) if total > 0.0 else np.zeros(len(ELASTIC))
 
 
 def _bodies(bodies: list[tuple[Array, float]], top: float) -> Figure:

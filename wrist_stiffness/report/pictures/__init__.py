@@ -1,1 +1,1 @@
-"""Pictures: every function writes one PNG; matplotlib is imported where it draws."""
+"""Pictures; matplotlib is imported where it draws."""

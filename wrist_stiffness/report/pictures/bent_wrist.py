@@ -21,7 +21,7 @@ from wrist_stiffness.mechanism.energy import component_screws
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.modes import NaturalModes
 from wrist_stiffness.mechanism.statics import contact_operators, platform_twist
-from wrist_stiffness.mechanism.vectors import cross, unit
+from wrist_stiffness.mechanism.vectors import cross, triad, unit
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 SHOWN_M = 0.010
@@ -66,10 +66,7 @@ def moved_shapes(table: Table, configuration: Configuration, screws: Array) -> l
 
 
 def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
-    """Draw the wrist at a pose, rigid in grey and bent in colours of its displacement.
-
-    `theta` (2,): motor angles [rad].
-    """
+    """Draw the wrist at angles (2,) [rad], rigid in grey, bent in colours of its displacement."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -95,10 +92,7 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
 def draw_mode_shapes(
     table: Table, configuration: Configuration, modes: NaturalModes, path: Path
 ) -> None:
-    """Draw the shapes of the four slowest natural modes at a pose, rigid in grey.
-
-    `configuration`: one pose, as a stack of one.
-    """
+    """Draw the four slowest natural modes at one pose, a stack of one; rigid in grey."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -196,12 +190,7 @@ def _bushing(
 ) -> Shape:
     bushing = table.geometry.bushings[joint]
     axis = _axis(configuration, table, joint)
-    start = np.eye(3)[np.argmin(np.abs(axis))]
-    p = unit(cross(axis, start))
-    q = cross(axis, p)
-    around = np.linspace(0.0, 2.0 * np.pi, AROUND)
-    outer = bushing.pin_diameter / 2.0 + bushing.wall
-    ring = outer * (np.outer(np.cos(around), p) + np.outer(np.sin(around), q))
+    ring = (bushing.pin_diameter / 2.0 + bushing.wall) * _around(axis, AROUND)
     half = bushing.length / 2.0
     centres = [(bushing.radius + end) * axis for end in (-half, half)]
     points = np.stack([centre + ring for centre in centres])
@@ -210,16 +199,19 @@ def _bushing(
     return Shape(points, _shift(points, far if fixed else 0.5 * (near + far)))
 
 
+def _around(axis: Array, count: int) -> Array:
+    """Return unit vectors all around an axis, (count, 3)."""
+    across = triad(axis, np.eye(3)[np.argmin(np.abs(axis))])[:, 1:]
+    turn = np.linspace(0.0, 2.0 * np.pi, count)
+    return np.asarray(np.stack([np.cos(turn), np.sin(turn)], axis=1) @ across.T)
+
+
 def _platform(table: Table, configuration: Configuration, twist: Array) -> Shape:
     plate = table.geometry.platform
     normal = configuration.platform @ plate.normal
     centre = configuration.platform @ plate.centre
-    p = unit(cross(normal, np.eye(3)[np.argmin(np.abs(normal))]))
-    q = cross(normal, p)
-    around = np.linspace(0.0, 2.0 * np.pi, 2 * AROUND)
-    rim = np.outer(np.cos(around), p) + np.outer(np.sin(around), q)
     radii = plate.diameter / 2.0 * np.array([0.0, 0.5, 1.0])
-    points = centre + radii[:, None, None] * rim
+    points = centre + radii[:, None, None] * _around(normal, 2 * AROUND)
     return Shape(points, _shift(points, twist))
 
 

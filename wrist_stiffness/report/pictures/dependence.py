@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.comparing.curve import CELL_DEG, ranks
+from wrist_stiffness.comparing.curve import CELL_DEG, Curve, ranks
+from wrist_stiffness.comparing.explained import Told
+from wrist_stiffness.inference import Observations
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.report.pictures.figure import new_figure
-from wrist_stiffness.report.pictures.palette import FLOOR, colour
+from wrist_stiffness.report.parts import typeset, unit_of
+from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure
 
 CLASSES = 12
 """Units of a further model are averaged in so many classes of the condition."""
 
 
-@dataclass(frozen=True, eq=False)
-class Against:
-    """One condition and a part of what is left."""
+def draw_against(every: Sequence[Told], models: Sequence[tuple[str, Observations]] = ()) -> Any:
+    """Return a figure with one plot for each condition.
 
-    title: str
-    conditions: tuple[str, ...]  # name of the condition with unit, or of both angles of a map
-    label: str  # name of the part, with unit
-    values: Array  # (n, 1) or (n, 2), of the condition
-    measured: Array  # (n,), the part of each unit, NaN where not measured
-    places: Array  # (c, 1) or (c, 2), where the law that was found is told
-    # `mean`, `sigma`: (c,), of that law, with one standard uncertainty
-    mean: Array
-    sigma: Array
-    # name of a further model and the same part of what it leaves
-    others: Sequence[tuple[str, Array]] = ()
-
-
-def draw_against(every: Sequence[Against]) -> Any:
-    """Return a figure with one plot for each condition."""
+    `models`: name and residuals of further models over the same units, shown along the same way.
+    """
     columns = min(len(every), 2)
     rows = -(-len(every) // columns)
     figure = new_figure(4.6 * columns + 0.4, 3.5 * rows + 0.3)
@@ -43,16 +30,21 @@ def draw_against(every: Sequence[Against]) -> Any:
     for plot in plots[len(every) :]:
         plot.axis("off")
     for plot, each in zip(plots, every, strict=False):
-        if len(each.conditions) == 2:
-            _draw_map(figure, plot, each)
+        if len(each.curve.names) == 2:
+            _draw_map(figure, plot, each.curve)
         else:
-            _draw_curve(plot, each)
-        plot.set_title(each.title, fontsize=9)
-        plot.set_xlabel(each.conditions[0])
+            _draw_curve(plot, each.curve, models)
+        plot.set_title(each.name, fontsize=9)
+        plot.set_xlabel(typeset(each.curve.labels[0]))
     return figure
 
 
-def _draw_curve(plot: Any, each: Against) -> None:
+def _label(curve: Curve) -> str:
+    """Return the name of the part of the error that is shown, with its unit."""
+    return f"{curve.quantity.name} {curve.where} [{unit_of(curve.quantity.unit)}]"
+
+
+def _draw_curve(plot: Any, each: Curve, models: Sequence[tuple[str, Observations]]) -> None:
     values, places = each.values[:, 0], each.places[:, 0]
     plot.plot(
         values, each.measured, ".", color=colour(0), alpha=0.35, markersize=3.5, label="measured"
@@ -65,14 +57,15 @@ def _draw_curve(plot: Any, each: Against) -> None:
     else:
         plot.fill_between(places, low, high, color="black", alpha=0.2, linewidth=0.0)
         plot.plot(places, each.mean, color="black", linewidth=1.5, label="fitted, 95 %")
-    for number, (name, residual) in enumerate(each.others, 1):
+    for number, (name, left) in enumerate(models, 1):
+        residual = each.along(left.values)
         known = np.isfinite(residual)
         at, means, errors = _means(values[known], residual[known])
         plot.errorbar(
             at, means, errors, fmt="s--", color=colour(number), markersize=4, capsize=2, label=name
         )
     plot.axhline(0.0, color=FLOOR, linewidth=0.6)
-    plot.set_ylabel(each.label)
+    plot.set_ylabel(_label(each))
     plot.grid(alpha=0.3)
     plot.legend(fontsize=8)
 
@@ -91,7 +84,7 @@ def _means(values: Array, residual: Array) -> tuple[list[float], list[float], li
     return at, means, errors
 
 
-def _draw_map(figure: Any, plot: Any, each: Against) -> None:
+def _draw_map(figure: Any, plot: Any, each: Curve) -> None:
     """Cells show the law that was found, dots in the same colours what was measured."""
     top = float(np.nanmax(np.abs(each.mean)))
     corners = np.floor(each.places / CELL_DEG).astype(int)
@@ -114,6 +107,6 @@ def _draw_map(figure: Any, plot: Any, each: Against) -> None:
         edgecolors="black",
         linewidths=0.4,
     )
-    figure.colorbar(shown, ax=plot, label=each.label, extend="both")
-    plot.set_ylabel(each.conditions[1])
+    figure.colorbar(shown, ax=plot, label=_label(each), extend="both")
+    plot.set_ylabel(typeset(each.labels[1]))
     plot.set_aspect("equal")

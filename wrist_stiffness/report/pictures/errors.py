@@ -10,8 +10,7 @@ import numpy as np
 
 from wrist_stiffness.inference.observations import Labels
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.report.pictures.figure import new_figure
-from wrist_stiffness.report.pictures.palette import FLOOR, colour
+from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure
 
 CELL_DEG = 6.0
 """Side of a cell of the map."""

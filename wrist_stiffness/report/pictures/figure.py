@@ -9,6 +9,12 @@ from wrist_stiffness.atomic_file import writing
 
 DPI = 130
 
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""For series, in their order; more repeat: any colour vision tells them apart (Okabe and Ito)."""
+
+FLOOR = "#444444"
+"""For what noise alone does."""
+
 
 def new_figure(width_in: float, height_in: float) -> Any:
     """Return a figure that needs no screen."""
@@ -18,10 +24,11 @@ def new_figure(width_in: float, height_in: float) -> Any:
 
 
 def save_figure(figure: Any, path: Path) -> None:
-    """Write a picture, complete or not at all.
-
-    `figure`: of `new_figure`; `path`: PNG file; an older one is replaced.  Raises `InputError` if
-    the file cannot be written.
-    """
+    """Write a figure as PNG, complete or not at all (InputError if that fails)."""
     with writing(path) as written:
         figure.savefig(written, dpi=DPI, format="png")
+
+
+def colour(number: int) -> str:
+    """Return the colour of a series."""
+    return COLOURS[number % len(COLOURS)]

@@ -90,12 +90,12 @@ def marker_columns(count: int) -> tuple[str, ...]:
 
 
 def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
-    """Sort the columns of a table by what they mean.
+    """Sort the columns of a table, in any order, by what they mean.
 
-    `header`: names in any order; `gauges`: columns that are readings of dial gauges and
-    inclinometers.  Gives `Columns`: columns that are neither the machine's nor the pose's are
-    temperatures (`T_COMPONENT_degC`) and covariates (`NAME_UNIT`).  Raises `InputError` if a column
-    is missing, named twice or has no unit or a wrong one, or nothing measured is there.
+    `gauges`: columns that are readings of dial gauges and inclinometers.  Columns that are neither
+    the machine's nor the pose's are temperatures (`T_COMPONENT_degC`) and covariates (`NAME_UNIT`).
+    Raises `InputError` if a column is missing, named twice or has no unit or a wrong one, or
+    nothing measured is there.
     """
     if not any(letter.isalpha() for name in header for letter in name):
         raise InputError("no column names in the first line")

@@ -31,8 +31,7 @@ def is_recording(path: Path) -> bool:
 def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
     """Return the recordings that paths name: a folder of recordings stands for all of them.
 
-    `paths`: recordings, or folders in which recordings lie side by side.  Raises `RecordingError`
-    if a path does not exist, or a folder holds no recording.
+    Raises `RecordingError` if a path does not exist, or a folder holds no recording.
     """
     found: dict[Path, None] = {}
     for path in map(Path, paths):

@@ -52,10 +52,7 @@ class GaugeTrack:
 
 
 def gauge_track(samples: GaugeSamples, notes: Mapping[str, Any]) -> GaugeTrack:
-    """Return the readings of a recording in the order of their stamps.
-
-    Raises `InputError` if the notes do not say what stands where.
-    """
+    """Return readings in the order of their stamps (InputError if no note says of what)."""
     try:
         gauges = tuple(Gauge.of_note(facts) for facts in notes[GAUGES])
     except (KeyError, TypeError, ValueError) as error:

@@ -34,10 +34,7 @@ def gauge_of(column: str) -> str:
 
 
 def read_gauges(path: str | Path) -> dict[str, Gauge]:
-    """Read what reads which column: by column, in the file's order.
-
-    Raises `InputError` if the file cannot be read, or a key is missing, unknown, or wrong.
-    """
+    """Read which gauge reads which column, in the file's order (InputError if it is wrong)."""
     found: dict[str, Gauge] = {}
     for node in FILE(read_yaml(path, InputError))["gauges"]:
         column, gauge = _gauge(node)

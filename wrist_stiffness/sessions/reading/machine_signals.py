@@ -10,15 +10,19 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.places import THERMOMETERS
 from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSamples, WrenchSamples
-from wrist_stiffness.sessions.reading.held_angles import without_held
+from wrist_stiffness.sessions.reading.joint_states import (
+    DENSE_S,
+    fault_of,
+    without_held,
+    without_wild,
+)
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_order
-from wrist_stiffness.sessions.reading.told_speeds import fault_of
-from wrist_stiffness.sessions.reading.wild_angles import DENSE_S, without_wild
 
 JOINT_GAP_S = 0.5
 """Farthest joint state from a measured pose that still tells its angles [s]."""
@@ -55,10 +59,9 @@ class MachineSignals:
     temperatures: Mapping[str, Signal]
     covariates: Mapping[str, Signal]
     remarks: tuple[str, ...] = ()  # what could not be used
+    load_age_limit_s: float = StreamSettings.load_age_limit_s  # oldest load that still counts [s]
 
-    def usable(
-        self, time_ns: Stamps, load_age_limit_s: float
-    ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    def usable(self, time_ns: Stamps) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Tell at which stamps (n,) [ns] angles and load are known, and why not at the others."""
         own = self.angles.time_ns
         during = (own[0] <= time_ns) & (time_ns <= own[-1])
@@ -66,7 +69,7 @@ class MachineSignals:
         way, straight = self._told_between(time_ns)
         newest = self.loads.newest(time_ns)
         age = time_ns - self.loads.time_ns[newest]
-        loads = (newest >= 0) & (age <= round(load_age_limit_s * NANOSECONDS))
+        loads = (newest >= 0) & (age <= round(self.load_age_limit_s * NANOSECONDS))
         usable, reasons = np.ones(len(time_ns), dtype=bool), []
         for known, what in (
             (during, "before the motor angles were first read or after they were last read"),
@@ -77,7 +80,7 @@ class MachineSignals:
                 "the motors' speed changed between joint states so that their angles may be wrong "
                 f"by more than {np.degrees(BENT_RAD):g} deg",
             ),
-            (loads, f"no load estimate in the {load_age_limit_s:g} s before"),
+            (loads, f"no load estimate in the {self.load_age_limit_s:g} s before"),
         ):
             if unknown := np.sum(usable & ~known):
                 reasons.append(f"{unknown} measured poses are not used: {what}")
@@ -134,7 +137,9 @@ class MachineSignals:
         )
 
 
-def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
+def machine_signals(
+    samples: Samples, frames: Frames, load_age_limit_s: float = StreamSettings.load_age_limit_s
+) -> MachineSignals:
     """Return the signals of a recording, loads moved to O.
 
     Gives `MachineSignals`: values that are not finite are left out.  Raises `FrameError` if loads
@@ -162,6 +167,7 @@ def machine_signals(samples: Samples, frames: Frames) -> MachineSignals:
         temperatures,
         _slow(samples.covariates),
         (*_said(wild, len(read), held_s), *filter(None, [fault]), *_doubted(temperatures)),
+        load_age_limit_s,
     )
 
 

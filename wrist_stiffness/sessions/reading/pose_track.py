@@ -11,14 +11,10 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
 from wrist_stiffness.compensation.measured_pose import NOT_MEASURED, UNIT_TOLERANCE
 from wrist_stiffness.errors import FrameError, InputError
+from wrist_stiffness.lookup.readout import MIN_SPREAD_RATIO
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
-from wrist_stiffness.sessions.reading.marker_poses import (
-    LEAST_MARKERS,
-    mirrored,
-    poses_from_markers,
-)
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
@@ -32,6 +28,11 @@ LEAST_FRAME_POSES = 3
 
 REFERENCE_SHARE = 0.05
 """Share of a session's frame poses, at its start, that are the reference for its motion."""
+
+LEAST_MARKERS = 3
+
+MIRROR_SHARE = 0.5
+"""Of markers in a plane the mirror image is a motion too: then both misfits are noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,28 +54,13 @@ class PoseTrack:
 
 
 def pose_track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
-    """Return the measured poses of a recording.
+    """Return the measured poses of a recording in the order of their stamps.
 
-    Parameters
-    ----------
-    samples : Samples
-        With poses or markers; poses are used where there are both.
-    markers : (k, 3) float
-        Nominal places of the markers in U [m].
-    frames : Frames
-        Sensor frames that are mapped to `wrist_base`.
-
-    Returns
-    -------
-    PoseTrack
-        In the order of their stamps.
-
-    Raises
-    ------
-    FrameError
-        If they are in a frame that is neither `wrist_base` nor mapped to it nor `instrument`.
-    InputError
-        If the markers are not those of the geometry or too few of them were ever seen.
+    `samples`: with poses or markers; poses are used where there are both; `markers` (k, 3): nominal
+    places of the markers in U [m]; `frames`: sensor frames that are mapped to `wrist_base`.  Raises
+    `FrameError` if poses are in a frame that is neither `wrist_base` nor mapped to it nor
+    `instrument`; `InputError` if the markers are not those of the geometry or too few of them were
+    ever seen.
     """
     measured = [each for each in (samples.poses, samples.markers) if len(each.time_ns)]
     unplaced = INSTRUMENT_FRAME in measured[0].frame_id
@@ -265,3 +251,47 @@ def _in_time_order(
             "of each only the last is used"
         )
     return PoseTrack(time_ns[order], shift[order], rotation[order], covariance, tuple(remarks))
+
+
+def poses_from_markers(nominal: Array, measured: Array) -> tuple[Array, Array]:
+    """Return the rigid motions with the least squared misfit (Kabsch), as `fit_markers` does.
+
+    `nominal` (k, 3): markers in U [m]; `measured` (n, k, 3): in F [m]; a marker with any NaN is
+    lost.  Gives `shift` (n, 3): position of the platform's point O in F [m], and `rotation` (n, 3,
+    3): U -> F.  NaN where fewer than three markers were seen or these lie near a line.
+    """
+    seen = np.isfinite(measured).all(axis=2)
+    shift, rotation = np.full((len(measured), 3), np.nan), np.full((len(measured), 3, 3), np.nan)
+    # One fit for each set of markers that were seen together.
+    patterns, belongs = np.unique(seen, axis=0, return_inverse=True)
+    for number, pattern in enumerate(patterns):
+        if pattern.sum() < LEAST_MARKERS:
+            continue
+        reference = nominal[pattern] - nominal[pattern].mean(axis=0)
+        sigma = np.linalg.svd(reference, compute_uv=False)
+        if sigma[1] < MIN_SPREAD_RATIO * sigma[0]:
+            continue
+        rows = np.flatnonzero(belongs.reshape(-1) == number)
+        points = measured[rows][:, pattern]
+        centre = points.mean(axis=1)
+        correlation = np.swapaxes(points - centre[:, None], 1, 2) @ reference
+        left, _, right = np.linalg.svd(correlation)
+        # A reflection is no motion: turn the direction that the markers tell least about.
+        left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+        rotation[rows] = left @ right
+        shift[rows] = centre - rotation[rows] @ nominal[pattern].mean(axis=0)
+    return shift, rotation
+
+
+def mirrored(nominal: Array, measured: Array) -> bool:
+    """Tell whether measured markers, as in `poses_from_markers`, are those of a mirror image."""
+    motion, mirror = (_misfit(nominal, sign * measured) for sign in (1.0, -1.0))
+    return mirror < MIRROR_SHARE * motion
+
+
+def _misfit(nominal: Array, measured: Array) -> float:
+    """Return the median misfit of a rigid motion [m]; infinite where there is none."""
+    shift, rotation = poses_from_markers(nominal, measured)
+    off = measured - nominal @ np.swapaxes(rotation, 1, 2) - shift[:, None]
+    known = np.linalg.norm(off[np.isfinite(off).all(axis=2)], axis=1)
+    return float(np.median(known)) if len(known) else np.inf

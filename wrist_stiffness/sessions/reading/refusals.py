@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from wrist_stiffness import topics
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError, RecordingError
 from wrist_stiffness.lookup.table import Table
@@ -15,14 +16,7 @@ from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.registration import agreement, put_right
 from wrist_stiffness.sessions.reading.signals import Stamps
-from wrist_stiffness.topics import (
-    BASE_FRAME,
-    GAUGE_READINGS,
-    JOINT_STATES,
-    LOAD_ESTIMATE,
-    PLATFORM_MARKERS,
-    PLATFORM_POSE,
-)
+from wrist_stiffness.topics import BASE_FRAME
 
 LEAST_POSES = 5
 
@@ -37,16 +31,16 @@ def require_topics(recording: Recording, samples: Samples, remaps: Mapping[str, 
     """Refuse a recording that lacks angles, loads or measured poses, and say why."""
     there = [topic.name for topic in recording.topics if topic.count]
     needed = {
-        (JOINT_STATES,): len(samples.joints.time_ns),
-        (LOAD_ESTIMATE,): len(samples.loads.time_ns),
-        (PLATFORM_POSE, PLATFORM_MARKERS, GAUGE_READINGS): sum(
+        (topics.JOINT_STATES,): len(samples.joints.time_ns),
+        (topics.LOAD_ESTIMATE,): len(samples.loads.time_ns),
+        (topics.PLATFORM_POSE, topics.PLATFORM_MARKERS, topics.GAUGE_READINGS): sum(
             len(each.time_ns) for each in (samples.poses, samples.markers, samples.gauges)
         ),
     }
-    for topics, count in needed.items():
+    for any_of, count in needed.items():
         if count:
             continue
-        wanted = [remaps.get(topic, topic) for topic in topics]
+        wanted = [remaps.get(topic, topic) for topic in any_of]
         names = " or ".join(wanted)
         # A topic that was recorded and cannot be read has no other name.
         if recording.damage and (not there or not set(wanted).isdisjoint(there)):

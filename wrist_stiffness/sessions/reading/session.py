@@ -10,7 +10,7 @@ encoder's count is the same on both sides, so nothing is smoothed.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError, RecordingError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.block import Block
 from wrist_stiffness.recording import open_recording, read_samples
-from wrist_stiffness.recording.samples import DEFAULT_JOINTS, Samples
-from wrist_stiffness.sessions.in_pieces import in_pieces
+from wrist_stiffness.recording.samples import Samples
+from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
 from wrist_stiffness.sessions.reading.gauge_readings import GaugeTrack, gauge_track, held_to
-from wrist_stiffness.sessions.reading.instrument import registered
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.sessions.reading.path import GAP_S, turning_stamps
@@ -43,13 +42,11 @@ from wrist_stiffness.sessions.reading.refusals import (
     require_same_wrist,
     require_topics,
 )
+from wrist_stiffness.sessions.reading.registration import registered
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps
 from wrist_stiffness.sessions.reading.static_frames import frames_of
-from wrist_stiffness.sessions.rigid_rotation import rigid_rotation
 from wrist_stiffness.sessions.table_range import beyond_range
-from wrist_stiffness.topics import (
-    MOTOR_COMMANDS,
-)
+from wrist_stiffness.topics import MOTOR_COMMANDS
 
 Mask = NDArray[np.bool_]
 
@@ -80,58 +77,39 @@ def read_session(
     table: Table,
     *,
     remaps: Mapping[str, str] | None = None,
-    joints: Sequence[str] = DEFAULT_JOINTS,
-    frames: Frames | None = None,
-    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+    settings: StreamSettings | None = None,
 ) -> MeasuredSession:
     """Read a recording with measured poses.
 
-    Parameters
-    ----------
-    path : path
-        rosbag2 folder with MCAP storage, or `.mcap` file.
-    table : Table
-        Of the wrist: its rigid kinematics, and its readout points as the nominal markers.
-    remaps : mapping, optional
-        Actual by standard topic name.
-    joints : sequence of str
-        Joint names of motor 1 and 2.
-    frames : Frames, optional
-        Sensor frames of loads, poses and markers, beside `wrist_base`, `wrist_platform` and those
-        on the recording's `/tf_static`.
-    load_age_limit_s : float
-        Oldest load that still belongs to a measured pose [s].
+    `path`: rosbag2 folder with MCAP storage, or `.mcap` file; `table`: of the wrist: its rigid
+    kinematics, and its readout points as the nominal markers; `remaps`: actual by standard topic
+    name; `settings`: joint names, age limit of loads, and sensor frames of loads, poses and markers
+    beside `wrist_base`, `wrist_platform` and those on the recording's `/tf_static`.
 
-    Returns
-    -------
-    MeasuredSession
-        Named after the recording, with remarks on everything that could not be used.  Where poses
-        are far apart, rows without a measurement tell where angles and load turned back in between.
+    The session is named after the recording, with remarks on everything that could not be used.
+    Where poses are far apart, rows without a measurement tell where angles and load turned back in
+    between.
 
-    Raises
-    ------
-    RecordingError
-        If the recording cannot be read, lacks a topic, or its clocks do not overlap.
-    FrameError
-        If loads or poses are in an unknown frame.
-    InputError
-        If too few poses are left, or they are those of another wrist.
+    Raises `RecordingError` if the recording cannot be read, lacks a topic, or its clocks do not
+    overlap; `FrameError` if loads or poses are in an unknown frame; `InputError` if too few poses
+    are left, or they are those of another wrist.
     """
+    settings = settings or StreamSettings()
+    joints = settings.motors.motor_1, settings.motors.motor_2
     recording = open_recording(path)
     samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
     require_topics(recording, samples, remaps or {})
     notes, unread = notes_of(samples)
-    known = frames_of(recording, remaps or {}, frames or Frames())
+    known = frames_of(recording, remaps or {}, settings.frames)
     try:
-        machine = machine_signals(samples, known.frames)
+        machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
         own = recording.path.name, machine
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
             markers = table.geometry.platform.readout_points
             track = pose_track(samples, markers, known.frames)
-            session = session_of(*own, track, table, load_age_limit_s)
+            session = session_of(*own, track, table)
         else:
-            read = gauge_track(samples.gauges, notes)
-            session = gauge_session(*own, read, table, load_age_limit_s)
+            session = gauge_session(*own, gauge_track(samples.gauges, notes), table)
     except (FrameError, InputError, RecordingError) as error:
         hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
         raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
@@ -143,18 +121,13 @@ def read_session(
 
 
 def session_of(
-    name: str,
-    machine: MachineSignals,
-    track: PoseTrack,
-    table: Table,
-    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+    name: str, machine: MachineSignals, track: PoseTrack, table: Table
 ) -> MeasuredSession:
     """Put the signals of a recording together: clocks, spikes, the way between poses.
 
-    `track`: measured poses in F; `table`, `load_age_limit_s`: as in `read_session`.  Gives
-    `MeasuredSession`: with remarks on everything that could not be used, and no notes.  Raises
-    `RecordingError` if the clocks do not overlap; `InputError` if too few poses are left, or they
-    are those of another wrist.
+    `track`: measured poses in F.  Gives a session with remarks on everything that could not be
+    used, and no notes.  Raises `RecordingError` if the clocks do not overlap; `InputError` if too
+    few poses are left, or they are those of another wrist.
     """
     remarks = [*machine.remarks, *track.remarks]
     require_overlap(machine.angles.time_ns, track.time_ns)
@@ -166,18 +139,8 @@ def session_of(
         )
         track = replace(track, time_ns=track.time_ns - round(offset.seconds * NANOSECONDS))
         late = None
-    usable, reasons = machine.usable(track.time_ns, load_age_limit_s)
-    remarks += reasons
+    usable, block = _usable(machine, track.time_ns, table, remarks)
     time_ns, shift, rotation = track.time_ns[usable], track.shift[usable], track.rotation[usable]
-    reachable = in_pieces(table.mechanism.reachable, machine.angles.interpolated(time_ns))
-    if not reachable.all():
-        remarks.append(
-            f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
-        )
-        time_ns, shift, rotation = time_ns[reachable], shift[reachable], rotation[reachable]
-    if len(time_ns) == 0:
-        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
-    block = machine.at(time_ns)
     rigid = rigid_rotation(table, block.theta)
     covariance = track.covariance
     if track.unplaced:
@@ -202,54 +165,55 @@ def session_of(
     session = MeasuredSession(
         name, block, shift, rotation, covariance, remarks=tuple(remarks), clock_offset_s=pair
     )
-    session = _with_path(session, machine, time_ns, table, load_age_limit_s)
+    session = _with_path(session, machine, time_ns, table)
     require_enough(session, len(track))
     return session
 
 
 def gauge_session(
-    name: str,
-    machine: MachineSignals,
-    track: GaugeTrack,
-    table: Table,
-    load_age_limit_s: float = StreamSettings.load_age_limit_s,
+    name: str, machine: MachineSignals, track: GaugeTrack, table: Table
 ) -> MeasuredSession:
-    """Put the signals of a recording with gauges together; parameters as for `session_of`."""
+    """Put the signals of a recording with gauges together, as `session_of` does of poses."""
+    remarks = [*machine.remarks]
     require_overlap(machine.angles.time_ns, track.time_ns)
-    usable, reasons = machine.usable(track.time_ns, load_age_limit_s)
-    usable[usable] = in_pieces(
-        table.mechanism.reachable, machine.angles.interpolated(track.time_ns[usable])
-    )
-    remarks, time_ns = [*machine.remarks, *reasons], track.time_ns[usable]
-    if len(time_ns) == 0:
-        raise InputError(f"no reading can be used: {'; '.join(remarks)}")
-    block = machine.at(time_ns)
+    usable, block = _usable(machine, track.time_ns, table, remarks)
     rigid = rigid_rotation(table, block.theta)
     readings, said = held_to(table, track.gauges, track.values[usable], rigid)
     remarks += [*said, *beyond_range(table, block)]
-    none = np.full((len(time_ns), 3), np.nan)
+    shift, rotation = np.full((len(block), 3), np.nan), np.full((len(block), 3, 3), np.nan)
     session = MeasuredSession(
-        name,
-        block,
-        none,
-        np.full((len(time_ns), 3, 3), np.nan),
-        remarks=tuple(remarks),
-        readings=readings,
+        name, block, shift, rotation, remarks=tuple(remarks), readings=readings
     )
-    session = _with_path(session, machine, time_ns, table, load_age_limit_s)
+    session = _with_path(session, machine, track.time_ns[usable], table)
     require_enough(session, len(track.time_ns))
     return session
 
 
+def _usable(
+    machine: MachineSignals, time_ns: Stamps, table: Table, remarks: list[str]
+) -> tuple[Mask, Block]:
+    """Tell which measurements (n,) have angles that the wrist reaches and a load; signals of these.
+
+    Why others are not used is added to the remarks.  Raises `InputError` if none can be used.
+    """
+    usable, reasons = machine.usable(time_ns)
+    remarks += reasons
+    reachable = in_pieces(table.mechanism.reachable, machine.angles.interpolated(time_ns[usable]))
+    if not reachable.all():
+        remarks.append(
+            f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
+        )
+        usable[usable] = reachable
+    if not usable.any():
+        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
+    return usable, machine.at(time_ns[usable])
+
+
 def _with_path(
-    session: MeasuredSession,
-    machine: MachineSignals,
-    time_ns: Stamps,
-    table: Table,
-    load_age_limit_s: float,
+    session: MeasuredSession, machine: MachineSignals, time_ns: Stamps, table: Table
 ) -> MeasuredSession:
     """Return a session (n,) with rows that tell the way between measurements far apart."""
-    path_ns = path_stamps(machine, time_ns, table, load_age_limit_s)
+    path_ns = path_stamps(machine, time_ns, table)
     place = np.searchsorted(time_ns, path_ns)
     new = time_ns[np.minimum(place, len(time_ns) - 1)] != path_ns
     if not new.any():
@@ -268,14 +232,11 @@ def _with_path(
     )
 
 
-def path_stamps(
-    machine: MachineSignals, time_ns: Stamps, table: Table, load_age_limit_s: float
-) -> Stamps:
+def path_stamps(machine: MachineSignals, time_ns: Stamps, table: Table) -> Stamps:
     """Return the stamps that tell the way to the first pose and between poses far apart.
 
-    `machine`: angles and loads; `time_ns` (n,) int64: stamps of measured poses, rising [ns];
-    `table`, `load_age_limit_s`: as in `read_session`.  Gives (p,) int64: where angles or load
-    turned back [ns].
+    `time_ns` (n,) int64: stamps of measured poses, rising [ns].  Gives (p,) int64: where angles or
+    load turned back [ns].
     """
     start = max(machine.angles.time_ns[0], machine.loads.time_ns[0])
     far = time_ns[0] - start > GAP_S * NANOSECONDS
@@ -286,7 +247,7 @@ def path_stamps(
         machine.loads, time_ns, PULL_SHARE * np.ptp(machine.loads.values, axis=0)
     )
     found = np.union1d(np.union1d(turns, pulls), time_ns[:1])
-    found = found[machine.usable(found, load_age_limit_s)[0]]
+    found = found[machine.usable(found)[0]]
     return found[table.mechanism.reachable(machine.angles.interpolated(found))]
 
 

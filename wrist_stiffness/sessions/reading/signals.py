@@ -24,10 +24,7 @@ class Signal:
         return len(self.time_ns)
 
     def interpolated(self, time_ns: Stamps) -> Array:
-        """Return the values between their two neighbours, exactly those of equal stamps.
-
-        `time_ns` (m,) int64: inside the signal's range [ns].  Gives (m, ...): linear in time.
-        """
+        """Return values (m, ...) at stamps (m,) inside the range: linear, exact at its own."""
         # Differences of stamps are exact in double precision, stamps since 1970 are not.
         start = self.time_ns[0]
         at, own = (time_ns - start).astype(float), (self.time_ns - start).astype(float)

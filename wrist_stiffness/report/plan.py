@@ -1,0 +1,154 @@
+"""A planned experiment: what it will settle, and its folder with table, trajectory and picture."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+from wrist_stiffness import topics
+from wrist_stiffness.commands.plan import COLUMNS, plan_rows
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.planning.aims import LONGER, Answer
+from wrist_stiffness.planning.information import chance_right
+from wrist_stiffness.planning.plan import Plan
+from wrist_stiffness.planning.timeline import Timeline
+from wrist_stiffness.recording.messages import JointTrajectory, JointTrajectoryPoint
+from wrist_stiffness.recording.samples import DEFAULT_JOINTS
+from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.report.pictures.experiment_plan import draw_plan
+
+MOST_LINES = 15
+"""Of each list; the rest is counted."""
+
+
+def require_new_folder(folder: str | Path) -> None:
+    """Refuse a folder that exists, or whose parent does not (InputError)."""
+    folder = Path(folder)
+    if folder.exists():
+        raise InputError(
+            f"{folder} exists already and is not overwritten; choose another name or remove it"
+        )
+    if not folder.resolve().parent.is_dir():
+        raise InputError(f"{folder} cannot be written: its folder does not exist")
+
+
+def write_plan(table: Table, timeline: Timeline, text: str, folder: str | Path) -> None:
+    """Write `plan.csv`, the recording `trajectory`, `plan.png` and `summary.txt`, all or nothing.
+
+    Raises `InputError` if the folder exists or cannot be written.
+    """
+    folder = Path(folder)
+    require_new_folder(folder)
+    partial = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    try:
+        partial.mkdir()
+        with (partial / "plan.csv").open("w", newline="") as stream:
+            rows = csv.DictWriter(stream, COLUMNS)
+            rows.writeheader()
+            rows.writerows(plan_rows(timeline))
+        with RecordingWriter(partial / "trajectory") as recording:
+            recording.write(topics.MOTOR_TRAJECTORY, trajectory(timeline), 0)
+        draw_plan(table, timeline, partial / "plan.png")
+        (partial / "summary.txt").write_text(text + "\n", encoding="utf-8")
+        os.rename(partial, folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror}") from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def trajectory(timeline: Timeline) -> JointTrajectory:
+    """Return the motors' motion.
+
+    All points are rests: a joint_trajectory_controller joins points with zero velocity and
+    acceleration by the same minimum-jerk moves.
+    """
+    rest = (0.0, 0.0)
+    points = tuple(
+        JointTrajectoryPoint(
+            positions=(float(theta[0]), float(theta[1])),
+            velocities=rest,
+            accelerations=rest,
+            time_from_start_ns=round(1e9 * time_s),
+        )
+        for time_s, theta, _ in timeline.knots[1:]
+    )
+    return JointTrajectory(joint_names=DEFAULT_JOINTS, points=points)
+
+
+def plan_summary(plan: Plan, commissioning: bool = False) -> str:
+    """Return what a technician wants to know of a plan, of a wrist or between rivals, as lines."""
+    lines = [_what(plan)]
+    seen = [a for a in plan.answers if not a.goal.rival]
+    blind = {a.goal.truth for a in seen if not a.settled}
+    pairs = [
+        a
+        for a in plan.answers
+        if a.goal.rival and a.goal.truth not in blind and a.goal.rival not in blind
+    ]
+    if commissioning:
+        lines += ["", f"sees {len(seen) - len(blind)} of {len(seen)} effects of plausible size"]
+        lines += [f"keeps apart {sum(a.settled for a in pairs)} of {len(pairs)} ordered pairs"]
+    else:
+        lines += _listed("will settle:", (_line(a) for a in plan.answers if a.settled))
+    longer = [a for a in (*seen, *pairs) if not a.settled and a.reachable]
+    lines += _listed(
+        "may stay open; diagnose the new recordings too and plan again, or give it more time:",
+        map(_line, _weakest(longer)),
+    )
+    never = [a for a in (*seen, *pairs) if not a.reachable]
+    lines += _listed(
+        f"no experiment of this kind with these loads settles, even {LONGER:g} times as long as "
+        "all settings that were considered:",
+        map(_line, _weakest(never)),
+    )
+    lines += _listed(
+        "not for poses and loads to show:",
+        (f"{name}: needs {signal}" for name, signal in plan.cannot.items()),
+    )
+    if commissioning:
+        lines += _listed(
+            "calibration: uncertainty falls by the factor",
+            (f"{name}  {factor:.1f}" for name, factor in plan.calibration.items()),
+            len(plan.calibration),
+        )
+    return "\n".join(lines)
+
+
+def _what(plan: Plan) -> str:
+    if plan.timeline is None:
+        return "no plan: nothing that these loads allow would settle any of the questions"
+    loads = sorted({visit.load.name for visit in plan.visits if visit.load.name})
+    poses = len({tuple(visit.theta) for visit in plan.visits})
+    return (
+        f"{plan.timeline.duration_s / 60.0:.1f} minutes: {len(plan.visits)} approaches to {poses} "
+        f"poses; {len(plan.timeline.dwells)} measurements at rest; "
+        f"loads: {', '.join(loads) or 'none'}"
+    )
+
+
+def _weakest(answers: list[Answer]) -> list[Answer]:
+    return sorted(answers, key=lambda answer: answer.discrimination)
+
+
+def _line(answer: Answer) -> str:
+    goal, d = answer.goal, answer.discrimination
+    if not goal.rival:
+        return f"{goal.truth} against nothing: {d:.1f} standard deviations"
+    right = 100.0 * float(chance_right(d))
+    return (
+        f"{goal.truth} if true, against {goal.rival}: {d:.1f} standard deviations, right in "
+        f"{min(right, 99.9):.1f} %"
+    )
+
+
+def _listed(title: str, lines: Iterable[str], most: int = MOST_LINES) -> list[str]:
+    found = list(lines)
+    if not found:
+        return []
+    more = [f"  and {len(found) - most} more (--json has all)"] if len(found) > most else []
+    return ["", title, *(f"  {line}" for line in found[:most]), *more]
