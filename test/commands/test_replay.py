@@ -14,7 +14,7 @@ from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.supervision import SupervisorSettings
-from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import Load

@@ -14,7 +14,7 @@ from wrist_stiffness.compensation.scales import Scales
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.compensation.supervisor import LATE_S, Supervisor
-from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.intake import UNIT_TOLERANCE, Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.readout import fit_markers
@@ -18,13 +19,12 @@ from wrist_stiffness.mechanism.components import Array
 NOT_MEASURED = 1.0
 """A variance of this or more says that a component is not measured [m^2, rad^2]."""
 
-UNIT_TOLERANCE = 1e-3
-"""Largest deviation of a quaternion's norm from one."""
-
 FARTHEST_M = 1e3
 """No instrument measures a wrist from farther away; its square is still a number."""
 
 FRAME_POSES_KEPT = 256
+
+Stamped = TypeVar("Stamped", bound=tuple[Any, ...])
 
 
 def measured_pose(
@@ -100,6 +100,23 @@ def _require_near(places: Array, what: str) -> None:
         raise InputError(f"{what}: a coordinate of {farthest:.4g} m is beyond {FARTHEST_M:g} m")
 
 
+def newest_before(kept: deque[Stamped], stamp_ns: int, age_limit_s: float, what: str) -> Stamped:
+    """Return the newest of what is kept, stamp [ns] first, that is not younger than a pose.
+
+    `what`: is kept, for the message.  Raises `InputError` if there is none, or it is too old.
+    """
+    newest = next((each for each in reversed(kept) if each[0] <= stamp_ns), None)
+    if newest is None:
+        raise InputError(f"measured pose: no {what} with a stamp before it")
+    age_ns = stamp_ns - newest[0]
+    if age_ns > round(age_limit_s * NANOSECONDS):
+        raise InputError(
+            f"measured pose: newest {what} is {age_ns / NANOSECONDS:.3f} s older "
+            f"(limit {age_limit_s:g} s)"
+        )
+    return newest
+
+
 class FrameMotion:
     """How the wrist's frame has moved since a target on it was first measured.
 
@@ -129,15 +146,7 @@ class FrameMotion:
         """
         if self._first is None:
             return rotation, position
-        newest = next((kept for kept in reversed(self._poses) if kept[0] <= stamp_ns), None)
-        if newest is None:
-            raise InputError("measured pose: no pose of the frame with a stamp before it")
-        age_s = (stamp_ns - newest[0]) / NANOSECONDS
-        if age_s > self._age_limit_s:
-            raise InputError(
-                f"measured pose: newest pose of the frame is {age_s:.3f} s older "
-                f"(limit {self._age_limit_s:g} s)"
-            )
+        newest = newest_before(self._poses, stamp_ns, self._age_limit_s, "pose of the frame")
         # F now, as seen from F at first: T_now T_first^-1.
         turn = newest[1] @ self._first[0].T
         moved = newest[2] - turn @ self._first[1]

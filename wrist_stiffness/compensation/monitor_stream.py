@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.measured_pose import (
     NOT_MEASURED,
     FrameMotion,
     measured_pose,
+    newest_before,
     pose_of_markers,
 )
 from wrist_stiffness.compensation.monitor import (
@@ -27,7 +27,6 @@ from wrist_stiffness.compensation.monitor import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -64,7 +63,7 @@ class MonitorStream(Stream):
     ) -> None:
         super().__init__(model, settings)
         self._monitoring = monitoring
-        self._age_limit_ns = round(joint_age_limit_s * NANOSECONDS)
+        self._joint_age_limit_s = joint_age_limit_s
         self._joints: deque[JointStateKept] = deque(maxlen=JOINT_STATES_KEPT)
         # motion of the wrist's frame, where a target on it is measured
         self.frame = FrameMotion(frame_age_limit_s)
@@ -149,7 +148,9 @@ class MonitorStream(Stream):
         self, stamp_ns: int, rotation: Array, position: Array, variance: Array | None
     ) -> MonitoredPose:
         rotation, position = self.frame.taken_out(stamp_ns, rotation, position)
-        theta, theta_dot = self._joints_at(stamp_ns)
+        _, theta, theta_dot = newest_before(
+            self._joints, stamp_ns, self._joint_age_limit_s, "joint state"
+        )
         running = self.running_model()
         prediction = running.advance(stamp_ns, theta, self.loads.at(stamp_ns)[1], theta_dot)
         residual = residual_of_pose(rotation, position, prediction)
@@ -162,15 +163,3 @@ class MonitorStream(Stream):
         excess = noise - self._monitoring.noise**2
         self.monitor.add(residual, np.diag(prediction.covariance) + excess)
         return MonitoredPose(residual, prediction.covariance + np.diag(noise), prediction.warnings)
-
-    def _joints_at(self, stamp_ns: int) -> tuple[Array, Array | None]:
-        newest = next((kept for kept in reversed(self._joints) if kept[0] <= stamp_ns), None)
-        if newest is None:
-            raise InputError("measured pose: no joint state with a stamp before it")
-        joint_stamp_ns, theta, theta_dot = newest
-        if stamp_ns - joint_stamp_ns > self._age_limit_ns:
-            raise InputError(
-                f"measured pose: newest joint state is {(stamp_ns - joint_stamp_ns) * 1e-9:.3f} s "
-                f"older (limit {self._age_limit_ns * 1e-9:g} s)"
-            )
-        return theta, theta_dot

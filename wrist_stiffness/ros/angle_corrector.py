@@ -34,8 +34,9 @@ from wrist_stiffness.ros.stream_messages import (
     error_payload,
     joint_payload,
     joint_reader,
+    plan_payload,
+    read_plan,
 )
-from wrist_stiffness.ros.trajectory_message import plan_payload, read_plan
 from wrist_stiffness.ros.wrist_node import WristNode
 from wrist_stiffness.topics import (
     MILLIDEGREES,
