@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
@@ -50,11 +50,6 @@ class Situation:
     def configuration(self) -> Configuration:
         """Configurations of shape (n,)."""
         return self.statics.configuration
-
-    @property
-    def evaluation(self) -> Evaluation:
-        """`closed_form` or `spline`."""
-        return self.statics.evaluation
 
     @property
     def table(self) -> Table:
