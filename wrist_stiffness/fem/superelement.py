@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from wrist_stiffness.fem.cyclic import CyclicFactor, factorise_cyclic
 from wrist_stiffness.fem.elasticity import cylindrical_axes, rigid_motion, surface_integrals
-from wrist_stiffness.fem.factor import Factor, factorise
+from wrist_stiffness.fem.factor import CyclicFactor, Factor, factorise, factorise_cyclic
 from wrist_stiffness.fem.parts import ElasticBody
 from wrist_stiffness.mechanism.components import Array
 

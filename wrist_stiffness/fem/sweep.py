@@ -24,7 +24,7 @@ from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.superelement import Interface
 from wrist_stiffness.lookup.biharmonic import KERNEL
 from wrist_stiffness.lookup.operators import pack
-from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.response import rated_map
 from wrist_stiffness.lookup.table import Evaluation, Table, TableHeader
 from wrist_stiffness.lookup.verification import interpolation_errors
 from wrist_stiffness.mechanism.components import ELASTIC, ElasticComponents

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.vectors import vee
 
 MIN_SPREAD_RATIO = 0.1
 """Smallest usable extent of the points relative to their largest (ratio of singular values)."""
@@ -44,14 +45,7 @@ class PlatformError:
         below 1e-8 rad.
         """
         r = self.rotation
-        twice_sine = np.linalg.norm(
-            [
-                r[..., 2, 1] - r[..., 1, 2],
-                r[..., 0, 2] - r[..., 2, 0],
-                r[..., 1, 0] - r[..., 0, 1],
-            ],
-            axis=0,
-        )
+        twice_sine = np.linalg.norm(vee(r), axis=-1)
         return np.arctan2(twice_sine, np.trace(r, axis1=-2, axis2=-1) - 1.0)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.mechanism.compiled_constants import GROUPS
+from wrist_stiffness.mechanism.compiled import GROUPS
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.model.contribution import Contribution, together

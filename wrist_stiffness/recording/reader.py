@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Literal
@@ -19,13 +20,50 @@ from wrist_stiffness.recording.mcap_chunk import (
     Chunk,
     Contents,
     Payloads,
+    Span,
     Times,
     contents_of,
 )
 from wrist_stiffness.recording.mcap_index import McapIndex, index_mcap
 from wrist_stiffness.recording.messages import Message
 from wrist_stiffness.recording.raw_block import Integers, RawBlock, RawMessage
-from wrist_stiffness.recording.topic_info import TopicInfo, topics_of
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """One topic of a recording."""
+
+    # `name`, `ros_type`: topic and ``package/msg/Type``
+    name: str
+    ros_type: str
+    count: int  # number of messages
+    # `first_ns`, `last_ns`: log time of the first and last message; None without messages
+    first_ns: int | None
+    last_ns: int | None
+    is_readable: bool  # whether the type is one that this project decodes
+
+
+def topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:
+    """Return the topics of files that belong together, by name."""
+    spans: dict[tuple[str, str, bool], Span | None] = {}
+    for index in indices:
+        own = index.spans
+        for channel_id, channel in index.channels.items():
+            key = (channel.topic, channel.ros_type, channel.message_type is not None)
+            span, known = own.get(channel_id), spans.get(key)
+            spans[key] = span.joined(known) if span and known else span or known
+    return tuple(
+        TopicInfo(
+            name=name,
+            ros_type=ros_type,
+            count=span.count if span else 0,
+            first_ns=span.first_ns if span else None,
+            last_ns=span.last_ns if span else None,
+            is_readable=is_readable,
+        )
+        for (name, ros_type, is_readable), span in sorted(spans.items(), key=lambda item: item[0])
+    )
+
 
 MOST_OPENED_BYTES = 256 << 20
 """Of chunks that overlap in time.  A recorder's overlap by as much as a message is late."""

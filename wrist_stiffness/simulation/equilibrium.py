@@ -27,7 +27,7 @@ from wrist_stiffness.mechanism.statics import (
     component_rotations,
     contact_operators,
     platform_twist,
-    weight_response,
+    weight_wrench,
 )
 from wrist_stiffness.mechanism.vectors import block_diagonal
 
@@ -83,7 +83,7 @@ class Pose:
         self.operators: ContactOperators = contact_operators(configuration, parts, gravity)
         self.rows = self.projectors.slides()
         self._carry = block_diagonal(np.swapaxes(self.projectors.of_components(), -1, -2))
-        self._weight = weight_response(configuration, parts, gravity)
+        self._weight = weight_wrench(configuration, parts, gravity, self.projectors)
         rotation = block_diagonal(component_rotations(configuration))
         self.flexibility = rotation @ parts.flexibility @ np.swapaxes(rotation, -1, -2)
         own = parts.sectors.component
@@ -159,7 +159,7 @@ class Pose:
             If Newton's method does not converge.
         """
         ops, n_k = self.operators, self.operators.screw_gap
-        free = self._weight.wrench + (self._carry @ load[:, None, :, None])[..., 0]
+        free = self._weight + (self._carry @ load[:, None, :, None])[..., 0]
         gap = ops.gap + _times(np.swapaxes(ops.force_twist, -1, -2), load)
         given = screws
         if extra is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.components import ELASTIC, LINKS
-from wrist_stiffness.mechanism.statics import component_rotations, weight_response
+from wrist_stiffness.mechanism.statics import component_rotations, weight_wrench
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.columns import Column, Factor, Recipe, Shape, Values, factor
 from wrist_stiffness.model.law import Contribution, Law
@@ -133,7 +133,7 @@ def tilted(at: Situation, change: np.ndarray) -> Contribution:
     sectors = at.parts.sectors
     turn = component_rotations(at.configuration).take(sectors.component, axis=-3)
     return Contribution(
-        through=weight_response(at.configuration, at.parts, change).wrench,
+        through=weight_wrench(at.configuration, at.parts, change, at.influence),
         gap=np.einsum("mi,nmji,j->nm", sectors.weight_approach, turn, change),
     )
 
