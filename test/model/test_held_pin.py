@@ -12,8 +12,8 @@ from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS
 from wrist_stiffness.model.rubbing import Bristles, dragged, slip
-from wrist_stiffness.simulation.laws.joint_clearance import JointClearance
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
+from wrist_stiffness.simulation.laws.joint_play import JointClearance
 from wrist_stiffness.simulation.seat import Seat
 from wrist_stiffness.simulation.wrist import TrueWrist
 

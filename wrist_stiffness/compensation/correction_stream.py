@@ -112,26 +112,12 @@ class CorrectionStream(Stream):
     ) -> CorrectedCommand:
         """Correct a command.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Its stamp [ns].
-        frame_id : str
-            Its header's frame; `wrist_corrected` marks a command that was corrected already.
-        names, positions, velocities : sequence
-            As in sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are
-            taken as differences of the angles.
-
-        Returns
-        -------
-        CorrectedCommand
-            With the fault, and on the way to no correction, wherever one cannot be had safely.
-
-        Raises
-        ------
-        InputError
-            If a motor is missing, an angle is not finite or beyond the joint limits: such a command
-            is not to be forwarded.
+        `stamp_ns`: its stamp [ns].  `frame_id`: its header's frame; `wrist_corrected` marks a
+        command that was corrected already.  `names`, `positions`, `velocities`: as in
+        sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are taken as
+        differences of the angles.  Gives `CorrectedCommand`: with the fault, and on the way to no
+        correction, wherever one cannot be had safely.  Raises `InputError` if a motor is missing,
+        an angle is not finite or beyond the joint limits: such a command is not to be forwarded.
         """
         theta = self._motor_angles(names, positions)
         theta_dot = self.settings.motors.speeds(names, velocities)

@@ -57,29 +57,11 @@ def pose_of_markers(
 ) -> tuple[Array, Array]:
     """Return the platform's pose in F from the places of its markers.
 
-    Parameters
-    ----------
-    frames : Frames
-        Frames in which they may come.
-    points : (n, 3) array_like
-        Measured [m]; a marker with a NaN is lost.
-    nominal : (n, 3) float
-        The same points of the platform in U [m].
-
-    Returns
-    -------
-    rotation : (3, 3) float
-        U -> F.
-    position : (3,) float
-        Of the platform's point at O in F [m].
-
-    Raises
-    ------
-    FrameError
-        If the frame is neither `wrist_base` nor mapped to it.
-    InputError
-        If another number of points comes, fewer than three that are not on a line are seen, or a
-        coordinate is infinite or beyond reason.
+    `frames`: frames in which they may come; `points` (n, 3): measured [m], a marker with a NaN is
+    lost; `nominal` (n, 3): the same points of the platform in U [m].  Gives `rotation` (3, 3): U ->
+    F, and `position` (3,): of the platform's point at O in F [m].  Raises `FrameError` if the frame
+    is neither `wrist_base` nor mapped to it; `InputError` if another number of points comes, fewer
+    than three that are not on a line are seen, or a coordinate is infinite or beyond reason.
     """
     turn, origin = frames.in_base(frame_id, "measured markers")
     places = np.reshape(np.asarray(points, dtype=float), (-1, 3))

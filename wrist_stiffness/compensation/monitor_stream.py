@@ -93,26 +93,11 @@ class MonitorStream(Stream):
     ) -> MonitoredPose:
         """Compare a measured pose with the prediction.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Its stamp [ns].
-        frame_id : str
-            `wrist_base`, or mapped to it.
-        position, quaternion : sequence of 3 and 4 float
-            Of the platform, U -> F; [m], x y z w.
-        variance : (6,) float, optional
-            Of the measurement, where it says so; huge where not measured [m^2, rad^2].
-
-        Returns
-        -------
-        MonitoredPose
-            To be published with the pose's stamp.
-
-        Raises
-        ------
-        WristError
-            If the pose is not usable or no joint state, load or pose of the frame belongs to it.
+        `stamp_ns`: its stamp [ns].  `frame_id`: `wrist_base`, or mapped to it.  `position`,
+        `quaternion`: of the platform, U -> F; [m], x y z w.  `variance` (6,): of the measurement,
+        where it says so; huge where not measured [m^2, rad^2].  Gives `MonitoredPose`: to be
+        published with the pose's stamp.  Raises `WristError` if the pose is not usable or no joint
+        state, load or pose of the frame belongs to it.
         """
         rotation, place = measured_pose(self.loads.frames, frame_id, position, quaternion)
         if variance is not None:

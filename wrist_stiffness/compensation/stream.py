@@ -142,23 +142,11 @@ class PredictionStream(Stream):
     ) -> PredictedSample:
         """Predict for a joint state.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Its stamp [ns].
-        names, positions, velocities : sequence
-            As in sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are
-            taken as differences of the angles.
-
-        Returns
-        -------
-        PredictedSample
-            To be published with the joint state's stamp.
-
-        Raises
-        ------
-        WristError
-            If the sample, the pose or the load cannot be used: nothing is to be published.
+        `stamp_ns`: its stamp [ns]; `names`, `positions`, `velocities`: as in
+        sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are taken as
+        differences of the angles.  Gives `PredictedSample`: to be published with the joint state's
+        stamp.  Raises `WristError` if the sample, the pose or the load cannot be used: nothing is
+        to be published.
         """
         motors = self.settings.motors
         theta, theta_dot = motors.angles(names, positions), motors.speeds(names, velocities)

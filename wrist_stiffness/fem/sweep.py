@@ -67,25 +67,11 @@ def build_table(
 ) -> Table:
     """Run the sweep.
 
-    Parameters
-    ----------
-    progress : callable
-        Called with steps done and in all.
-    condenser : callable
-        `condense_solid`, or a `CondensedStore` for a build that can be resumed.
-
-    Returns
-    -------
-    Table
-        With its stated errors in the header; not yet written.  They may exceed the tolerance
-        where walls that lift off do, or where a finer mesh would need too much memory.
-
-    Raises
-    ------
-    GeometryError
-        If the geometry is wrong.
-    TableError
-        If nodes shall use splines and no grid meets the tolerance.
+    `progress`: called with steps done and in all; `condenser`: `condense_solid`, or a
+    `CondensedStore` for a build that can be resumed.  Gives `Table`: with its stated errors in the
+    header; not yet written.  They may exceed the tolerance where walls that lift off do, or where a
+    finer mesh would need too much memory.  Raises `GeometryError` if the geometry is wrong;
+    `TableError` if nodes shall use splines and no grid meets the tolerance.
     """
     geometry = geometry_from_values(values)
     steps = len(ELASTIC) + 2

@@ -57,23 +57,11 @@ def fit_platform_error(points_undeformed: ArrayLike, points_deformed: ArrayLike)
     points centimetres from O, 1e-17 m in s, wherever O lies; only the rounding of the given
     coordinates is added.
 
-    Parameters
-    ----------
-    points_undeformed : (n, 3) or (..., n, 3) array
-        Readout points of the rigid wrist in F [m]: one set for all, or one per pose.
-    points_deformed : (..., n, 3) array
-        The same points under load in F [m].
-
-    Returns
-    -------
-    PlatformError
-        shift (..., 3) [m] and rotation (..., 3, 3).
-
-    Raises
-    ------
-    InputError
-        Fewer than four points, shapes that do not match, values that are not finite, or points
-        near a plane (sigma_min / sigma_max of the centred points below `MIN_SPREAD_RATIO`).
+    `points_undeformed` (n, 3) or (..., n, 3): readout points of the rigid wrist in F [m], one set
+    for all, or one per pose; `points_deformed` (..., n, 3): the same points under load in F [m].
+    Raises `InputError`: fewer than four points, shapes that do not match, values that are not
+    finite, or points near a plane (sigma_min / sigma_max of the centred points below
+    `MIN_SPREAD_RATIO`).
     """
     undeformed = _as_points(points_undeformed, "undeformed readout points")
     deformed = _as_points(points_deformed, "deformed readout points")
@@ -92,23 +80,11 @@ def fit_platform_error(points_undeformed: ArrayLike, points_deformed: ArrayLike)
 def fit_markers(points_reference: ArrayLike, points_measured: ArrayLike) -> PlatformError:
     """Fit the platform error to measured markers: the rigid motion with the least squared misfit.
 
-    Parameters
-    ----------
-    points_reference : (n, 3) array
-        Nominal marker positions of the rigid wrist in F [m].
-    points_measured : (n, 3) array
-        Measured positions in F [m]; a marker with any NaN coordinate is lost and left out.
-
-    Returns
-    -------
-    PlatformError
-        shift (3,) [m] and rotation (3, 3).
-
-    Raises
-    ------
-    InputError
-        Fewer than three markers seen, markers near a line (second singular value of the centred
-        points below `MIN_SPREAD_RATIO` of the first), shapes that do not match, infinite values.
+    `points_reference` (n, 3): nominal marker positions of the rigid wrist in F [m];
+    `points_measured` (n, 3): measured positions in F [m]; a marker with any NaN coordinate is lost
+    and left out.  Raises `InputError`: fewer than three markers seen, markers near a line (second
+    singular value of the centred points below `MIN_SPREAD_RATIO` of the first), shapes that do not
+    match, infinite values.
     """
     reference = _as_points(points_reference, "reference markers")
     measured = _as_points(points_measured, "measured markers")

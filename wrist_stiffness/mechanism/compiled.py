@@ -263,30 +263,12 @@ class CompiledWrist:
     ) -> tuple[Array, Array, Flags]:
         """Solve for the platform's twist under a load, with contact and own weight.
 
-        Parameters
-        ----------
-        wrench : (6,) float
-            Load on the platform at O in F, as it acts [N, N m].
-        active : (m,) bool, optional
-            First guess of the sectors in contact; leaves no trace in the result.
-        limb_1, limb_2 : (6,) float, optional
-            Further screws in the limbs at O in F [m, rad].
-        opening : (m,) float, optional
-            Further opening of the sectors [m].
-
-        Returns
-        -------
-        twist : (6,) float
-            Of the platform at O in F, first order [m, rad].
-        force : (m,) float
-            Of each sector [N].
-        active : (m,) bool
-            Sectors in contact.
-
-        Raises
-        ------
-        InputError
-            If the flanges' flexibility is not positive definite.
+        `wrench` (6,): load on the platform at O in F, as it acts [N, N m].  `active` (m,): first
+        guess of the sectors in contact; leaves no trace in the result.  `limb_1`, `limb_2` (6,):
+        further screws in the limbs at O in F [m, rad].  `opening` (m,): further opening of the
+        sectors [m].  Gives `twist` (6,): of the platform at O in F, first order [m, rad], `force`
+        (m,): of each sector [N], and `active` (m,): sectors in contact.  Raises `InputError` if the
+        flanges' flexibility is not positive definite.
         """
         twist, force = np.empty(6), np.empty(self.sectors)
         closed = np.zeros(self.sectors, dtype=bool) if active is None else active.copy()
@@ -345,24 +327,11 @@ class CompiledWrist:
     ) -> int:
         """Correct commands in their order (see `compensation.correction.correct` and `safety`).
 
-        Parameters
-        ----------
-        task : (11,) float, optional
-            What to make right and how far (see `compensation.corrector`); None where `found` was
-            searched before.
-        safety : (8,) float, optional
-            From `SafetySettings.compiled`; None where nothing is to be applied yet.
-        commands : CompiledCommands
-            n of them.
-        state : CorrectorState
-            Of the command before; afterwards that of the last command done.
-        supervisor : CompiledSupervisor, optional
-            Writes the loads to correct for over the measured ones, and the shares.
-
-        Returns
-        -------
-        int
-            Which command comes next: the first that cannot be done here, else the end.
+        `task` (11,): what to make right and how far (see `compensation.corrector`); None where
+        `found` was searched before.  `safety` (8,): from `SafetySettings.compiled`; None where
+        nothing is to be applied yet.  `state`: of the command before; afterwards that of the last
+        command done.  `supervisor`: writes the loads to correct for over the measured ones, and the
+        shares.  Gives which command comes next: the first that cannot be done here, else the end.
         """
         done: int = native.correct(
             self._mechanism,

@@ -32,26 +32,11 @@ def solve_contact(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Solve the contact problem of one pose.
 
-    Parameters
-    ----------
-    approach : (m, m) float
-        A [m/N].
-    gap : (m,) float
-        Opening without contact forces; negative where the surfaces would overlap [m].
-    active : (m,) bool, optional
-        First guess of the sectors in contact, usually those of the sample before.
-
-    Returns
-    -------
-    force : (m,) float
-        Contact forces, not negative [N].
-    active : (m,) bool
-        Sectors in contact.
-
-    Raises
-    ------
-    InputError
-        If shapes do not fit, an input is not finite or the matrix is not positive definite.
+    `approach` (m, m): A [m/N].  `gap` (m,): opening without contact forces; negative where the
+    surfaces would overlap [m].  `active` (m,): first guess of the sectors in contact, usually those
+    of the sample before.  Gives `force` (m,): not negative [N], and `active` (m,): sectors in
+    contact.  Raises `InputError` if shapes do not fit, an input is not finite or the matrix is not
+    positive definite.
     """
     m = len(gap)
     if approach.shape != (m, m) or (active is not None and active.shape != (m,)):

@@ -116,16 +116,8 @@ class Recording:
     def raw_messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Iterate over the stored messages, in log-time order, without decoding.
 
-        Parameters
-        ----------
-        topics : Collection[str], optional
-            Names to keep; None keeps all.
-
-        Yields
-        ------
-        RawMessage
-            Ties in log time come in the order of the file.  Memory is bounded by the chunks that
-            overlap in time.
+        `topics`: names to keep; None keeps all.  Ties in log time come in the order of the file.
+        Memory is bounded by the chunks that overlap in time; too many are a `RecordingError`.
         """
         for part in self._parts(topics):
             yield from part.messages()
@@ -135,22 +127,10 @@ class Recording:
     ) -> Iterator[RawBlock]:
         """Iterate over the stored messages in log-time order, many at a time, without decoding.
 
-        Parameters
-        ----------
-        topics : Collection[str], optional
-            Names to keep; None keeps all.
-        least : int
-            So many messages at a time or up to a chunk more, or fewer that are large.
+        They are those of `raw_messages`, in the same order.
 
-        Yields
-        ------
-        RawBlock
-            The same messages in the same order as `raw_messages`.
-
-        Raises
-        ------
-        RecordingError
-            As `raw_messages`.
+        `topics`: names to keep; None keeps all; `least`: so many messages at a time or up to a
+        chunk more, or fewer that are large.
         """
         waiting: list[RawBlock] = []
         for part in self._parts(topics):
@@ -214,29 +194,15 @@ class Recording:
         yield from _earlier(opened, LAST_TIME_NS, len(chunks))
 
     def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Times, Payloads]]:
-        """Iterate over the payloads of topics, many of one topic at a time.
-
-        Yields
-        ------
-        tuple[str, array, Payloads]
-            Topic, log times [ns] and payloads, in their order.
-        """
+        """Iterate over topic, log times [ns] and payloads, many of one topic at a time."""
         for block in self.blocks(topics, PAYLOADS_AT_A_TIME):
             for topic, rows in block.topics().items():
                 yield topic, block.time_ns[rows], block.payloads(rows)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, Message]]:
-        """Iterate over the decoded messages in log-time order.
+        """Iterate over topic, log time [ns] and decoded message, in log-time order.
 
-        Parameters
-        ----------
-        topics : Collection[str], optional
-            Names to keep; None keeps all whose type is known.
-
-        Yields
-        ------
-        tuple[str, int, Message]
-            Topic, log time [ns], message.
+        `topics`: names to keep; None keeps all whose type is known.
         """
         self._undecodable.clear()
         for channel, log_time_ns, payload in self.raw_messages(topics):

@@ -140,23 +140,11 @@ class Pose:
     ) -> Equilibrium:
         """Find the equilibrium.
 
-        Parameters
-        ----------
-        load : (n, 6) float
-            Wrench on the platform at O in F.
-        screws : (n, 8, 6) float
-            Screws at the components that no wrench changes [m, rad].
-        bends : sequence of (int, Bend)
-            Number of a component and its law besides its elasticity.
-        extra : (n, 8, 6) float, optional
-            Wrench through the components from inside the wrist, friction for instance.
-        near : Equilibrium, optional
-            Where the iteration begins.
-
-        Raises
-        ------
-        InputError
-            If Newton's method does not converge.
+        `load` (n, 6): wrench on the platform at O in F; `screws` (n, 8, 6): screws at the
+        components that no wrench changes [m, rad]; `bends`: number of a component and its law
+        besides its elasticity; `extra` (n, 8, 6): wrench through the components from inside the
+        wrist, friction for instance; `near`: where the iteration begins.  Raises `InputError` if
+        Newton's method does not converge.
         """
         ops, n_k = self.operators, self.operators.screw_gap
         free = self._weight + (self._carry @ load[:, None, :, None])[..., 0]
