@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wrist_stiffness.compensation import supervisor as module
+from wrist_stiffness.compensation.belief import State, SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.payload import ENOUGH, Payload, Thresholds
 from wrist_stiffness.compensation.scales import Scales
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.compensation.supervisor import LATE_S, Supervisor
 from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import InputError

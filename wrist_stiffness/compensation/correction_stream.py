@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.compensation.belief import Supervision
 from wrist_stiffness.compensation.corrected import (
     CorrectedBlock,
     CorrectedCommand,
@@ -18,11 +19,10 @@ from wrist_stiffness.compensation.corrector import Correcting, Corrector
 from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
 from wrist_stiffness.compensation.payload import Thresholds
-from wrist_stiffness.compensation.perishable import require_within_limits, within_limits
+from wrist_stiffness.compensation.safety import require_within_limits, within_limits
 from wrist_stiffness.compensation.scales import Held
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
-from wrist_stiffness.compensation.supervision import Supervision
 from wrist_stiffness.compensation.supervisor import Supervisor
 from wrist_stiffness.compensation.trajectory_plan import PlanCorrector, PlannedPoint
 from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, WristError

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.intake import Frames, MotorNames, checked_prefix, frames_from_yaml
 from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.errors import InputError
 
 ParameterValue = bool | int | float | str

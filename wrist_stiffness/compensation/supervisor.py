@@ -40,12 +40,14 @@ from wrist_stiffness.compensation.belief import (
     RAMP_S,
     SETTLE_S,
     Belief,
+    State,
+    Supervision,
+    SupervisorSettings,
     apart,
 )
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.payload import Payload, PayloadEstimate, Reading, Thresholds
 from wrist_stiffness.compensation.scales import Held, Scales
-from wrist_stiffness.compensation.supervision import State, Supervision, SupervisorSettings
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.block import Load
 

@@ -35,13 +35,8 @@ def solve_contact(
     `approach` (m, m): A [m/N].  `gap` (m,): opening without contact forces; negative where the
     surfaces would overlap [m].  `active` (m,): first guess of the sectors in contact, usually those
     of the sample before.  Gives `force` (m,): not negative [N], and `active` (m,): sectors in
-    contact.  Raises `InputError` if shapes do not fit, an input is not finite or the matrix is not
-    positive definite.
+    contact.  Raises `InputError` if an input is not finite or the matrix is not positive definite.
     """
-    m = len(gap)
-    if approach.shape != (m, m) or (active is not None and active.shape != (m,)):
-        guess = "" if active is None else f" and a guess of shape {active.shape}"
-        raise InputError(f"contact: {m} gaps, but a flexibility of shape {approach.shape}{guess}")
     if not (np.all(np.isfinite(gap)) and np.all(np.isfinite(approach))):
         raise InputError("contact: a gap or a flexibility is not finite")
     return settle(approach, gap, active)

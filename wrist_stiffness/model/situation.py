@@ -19,8 +19,13 @@ from wrist_stiffness.mechanism.statics import ContactOperators, component_rotati
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
-from wrist_stiffness.model.constants import Constants
-from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError, together
+from wrist_stiffness.model.contribution import (
+    NOTHING,
+    Constants,
+    Contribution,
+    MissingSignalError,
+    together,
+)
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 

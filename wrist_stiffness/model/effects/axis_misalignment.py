@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from wrist_stiffness.mechanism.components import JOINTS
-from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
+from wrist_stiffness.model.places import cross_axes
 from wrist_stiffness.model.situation import Situation
 
 SHIFTS = {

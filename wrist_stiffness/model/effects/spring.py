@@ -9,10 +9,9 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.at_point import bushing_centre, screw_from, wrench_at
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
-from wrist_stiffness.model.places import MOTOR_JOINT
+from wrist_stiffness.model.places import MOTOR_JOINT, bushing_centre, screw_from, wrench_at
 from wrist_stiffness.model.situation import Situation
 
 KEYS = tuple(f"{axis}_um_per_N" for axis in "xyz") + tuple(
