@@ -9,11 +9,11 @@ from closed_loop_restless import Restless, restless
 from closed_loop_truth import PerfectStream, TrueRunningModel
 from numpy.typing import NDArray
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.vectors import skew

@@ -24,8 +24,7 @@ from whole_wrist.solve import solve_pose
 
 from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
 from wrist_stiffness.fem.solids import MeshSettings
-from wrist_stiffness.lookup.rated_load import rated_wrench
-from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.response import rated_wrench, respond
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of

@@ -29,7 +29,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.commands.parameter_file import node_settings
-from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
+from wrist_stiffness.compensation.intake import frames_from_yaml
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.inputs.document import yaml_node
 from wrist_stiffness.lookup.table_file import load_table

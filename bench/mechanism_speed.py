@@ -21,7 +21,7 @@ from wrist_stiffness.mechanism.components import (
 from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.mechanism.statics import compliance, contact_operators, weight_response
+from wrist_stiffness.mechanism.statics import compliance, contact_operators, weight_wrench
 
 SECTORS = 8
 POSES = 1000
@@ -75,7 +75,7 @@ def main() -> None:
             "forward to compliance": lambda theta=theta: compliance(
                 mechanism.forward(theta), components
             ),
-            "own weight": lambda at=at: weight_response(at, components, gravity),
+            "own weight": lambda at=at: weight_wrench(at, components, gravity, influence(at)),
             "contact operators, 24 sectors": lambda at=at: contact_operators(
                 at, components, gravity
             ),

@@ -23,10 +23,10 @@ from mcap.writer import CompressionType, Writer
 
 from wrist_stiffness.commands.parameter_file import node_settings
 from wrist_stiffness.commands.replay import replay
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.recording.messages import (

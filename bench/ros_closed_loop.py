@@ -12,9 +12,9 @@ import sys
 
 import numpy as np
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model

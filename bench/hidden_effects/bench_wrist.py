@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 
 RATE_HZ = 10.0
 
-TRUTH = ("wrist_stiffness.simulation.size", "wrist_stiffness.simulation.residual")
+TRUTH = ("wrist_stiffness.simulation.size", "wrist_stiffness.simulation.size")
 """Modules that make a riddle, with all that they import."""
 
 PACKAGE = Path(wrist_stiffness.__file__).parent

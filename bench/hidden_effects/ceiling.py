@@ -26,7 +26,7 @@ from wrist_stiffness.simulation.catalogue import CATALOGUE, places
 from wrist_stiffness.simulation.cell import CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.effect_entry import Draw
 from wrist_stiffness.simulation.laws.law import Law
-from wrist_stiffness.simulation.residual import BasePose, base_pose, departure
+from wrist_stiffness.simulation.size import BasePose, base_pose, departure
 from wrist_stiffness.simulation.wrist import TrueWrist
 
 PLACES = 6

@@ -23,8 +23,7 @@ from wrist_stiffness.sessions.reading.signals import Signal
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import SENSED, CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
-from wrist_stiffness.simulation.residual import BasePose, base_pose
-from wrist_stiffness.simulation.size import Scale, sample_covariance
+from wrist_stiffness.simulation.size import BasePose, Scale, base_pose, sample_covariance
 
 PROGRAM_SEED = 101
 """Of the first session; the second has the next one."""

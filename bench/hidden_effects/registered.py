@@ -9,7 +9,7 @@ from bench_wrist import Array
 
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import skew
-from wrist_stiffness.simulation.residual import BasePose, departure
+from wrist_stiffness.simulation.size import BasePose, departure
 
 PASSES = 5
 """Of Gauss and Newton; 1 mm and 0.2 deg need three."""

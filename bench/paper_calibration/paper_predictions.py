@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from paper_figures import TO_UNITS, PaperExperiment
 
-from wrist_stiffness.lookup.rated_load import rated_wrench
-from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.response import rated_wrench, respond
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry_file import mechanism_of

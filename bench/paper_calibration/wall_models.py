@@ -26,8 +26,7 @@ from wrist_stiffness.fem.condensed_store import condense_solid
 from wrist_stiffness.fem.one_sided import PatchedBushing, PatchedWrist, patch_bushing, solve_patches
 from wrist_stiffness.fem.parts import assemble_body, wrist_parts
 from wrist_stiffness.fem.solids import MeshSettings
-from wrist_stiffness.lookup.rated_load import rated_map, rated_wrench
-from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.response import rated_map, rated_wrench, respond
 from wrist_stiffness.lookup.verification import random_loads, relative_misses
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry

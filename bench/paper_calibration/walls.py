@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
 from wrist_stiffness.fem.superelement import INTERFACES
-from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.response import rated_map
 from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
 from wrist_stiffness.mechanism.statics import contact_operators

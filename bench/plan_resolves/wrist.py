@@ -16,7 +16,7 @@ from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
 from wrist_stiffness.simulation.program import Program, Track
-from wrist_stiffness.simulation.residual import residual
+from wrist_stiffness.simulation.size import residual
 
 RATE_HZ = 5.0
 PACE = Pace(float(np.radians(30.0)), 2.0, in_motion=False)

@@ -5,7 +5,7 @@ import pytest
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.lookup.operators import pack
-from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.response import rated_map
 from wrist_stiffness.lookup.table_file import load_table, save_table
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file

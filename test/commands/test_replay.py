@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.parameter_file import node_settings
 from wrist_stiffness.commands.replay import replay
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
-from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.lookup.table_file import save_table
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import Load

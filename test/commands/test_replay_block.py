@@ -10,9 +10,9 @@ from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.commands.replay_block import BlockReplay
 from wrist_stiffness.commands.signals_ahead import LOOKAHEAD_NS
 from wrist_stiffness.commands.wrist_drawing import Pace, WristDrawing
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording.messages import (

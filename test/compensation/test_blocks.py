@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.payload import Payload
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 

@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from stops import Stops
 
+from wrist_stiffness.compensation.belief import State, SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.model.error_model import ErrorModel, Load
 
 NAMES = ("motor_1_joint", "motor_2_joint")

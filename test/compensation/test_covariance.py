@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.compensation.intake import Frames
-from wrist_stiffness.compensation.load_covariance import load_covariance, tangent_compliance
 from wrist_stiffness.compensation.monitor import residual_of_pose
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.stream import PredictionStream
+from wrist_stiffness.compensation.stream import (
+    PredictionStream,
+    load_covariance,
+    tangent_compliance,
+)
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel, Load

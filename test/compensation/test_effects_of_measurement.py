@@ -7,10 +7,10 @@ same commands leave the true platform where it is, and the load is said as it wa
 import numpy as np
 import pytest
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import catalogue, find_law

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.compensation.belief import State, SupervisorSettings
 from wrist_stiffness.compensation.correction import residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.held_signals import HeldSignals
@@ -16,7 +17,6 @@ from wrist_stiffness.compensation.monitor_stream import MonitorStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block, Sample
 from wrist_stiffness.model.effect import Effect

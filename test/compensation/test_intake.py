@@ -4,8 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
-from wrist_stiffness.compensation.intake import COMMAND, Frames, MotorNames, SensorFrame
+from wrist_stiffness.compensation.intake import (
+    COMMAND,
+    Frames,
+    MotorNames,
+    SensorFrame,
+    frames_from_yaml,
+)
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 

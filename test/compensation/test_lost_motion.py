@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.memory import play
 from wrist_stiffness.model.parameters import Estimate

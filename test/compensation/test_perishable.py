@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.perishable import require_fresh
+from wrist_stiffness.compensation.safety import require_fresh
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
-from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import InputError, StaleCommandError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel

@@ -6,10 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
-from wrist_stiffness.compensation.intake import Frames, SensorFrame
+from wrist_stiffness.compensation.intake import (
+    Frames,
+    SensorFrame,
+    frames_from_yaml,
+    sensor_frames,
+    static_transform,
+)
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.static_transforms import sensor_frames, static_transform
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import FrameError, InputError
 

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wrist_stiffness.compensation import supervisor as module
+from wrist_stiffness.compensation.belief import State, SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.payload import ENOUGH, Payload, Thresholds
 from wrist_stiffness.compensation.scales import Scales
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.compensation.supervisor import LATE_S, Supervisor
-from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 

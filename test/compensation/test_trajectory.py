@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
-from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
 

@@ -6,7 +6,7 @@ import pytest
 from wrist_stiffness.fem.components import elastic_components
 from wrist_stiffness.fem.condensed_store import condense_solid
 from wrist_stiffness.fem.error_budget import ORDERS, error_budget
-from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.response import rated_map
 from wrist_stiffness.mechanism.components import ELASTIC
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 from wrist_stiffness.mechanism.statics import contact_operators

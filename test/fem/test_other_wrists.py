@@ -5,6 +5,7 @@ import copy
 import numpy as np
 import pytest
 import yaml
+from changed_geometry import LAYERS, checked
 from whole_wrist.model import build_wrist, factor_pose
 from whole_wrist.solve import Disturbance, solve_pose
 
@@ -12,10 +13,7 @@ from wrist_stiffness.errors import GeometryError
 from wrist_stiffness.fem.condensed_store import CondensedStore
 from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.sweep import BuildSettings, build_table
-from wrist_stiffness.inputs.document import node_of
 from wrist_stiffness.lookup.response import respond
-from wrist_stiffness.mechanism.fits import check_fits
-from wrist_stiffness.mechanism.geometry_file import geometry_of
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = yaml.safe_load(shipped_file("config/palmieri2015.yaml").read_text())
@@ -29,15 +27,6 @@ COARSE = BuildSettings(
 )
 AGREEMENT = 1e-6
 """Of twists; what is left is the rounding of two solvers."""
-
-LAYERS = {
-    "young_GPa": [2.0, 9.0, 3.5],
-    "poisson": [0.1, 0.2, 0.4],
-    "shear_GPa": [0.9, 0.6, 1.7],
-    "density_kg_m3": 1400.0,
-    "expansion_1e-6_K": 30.0,
-    "source": "assumed",
-}
 
 LOAD = np.array([1.0, -2.0, 1.5, 0.02, 0.01, -0.03])
 
@@ -59,13 +48,6 @@ def wrist(arcs, motors=90.0, askew=0.0, tilt=20.0):
         bushing["radius_mm"] = abs(bushing["radius_mm"])
     values["limits"] |= {"operative_tilt_deg": tilt, "map_margin": 1.1}
     return values
-
-
-def checked(values):
-    root = node_of(values, "wrist.yaml", GeometryError)
-    geometry = geometry_of(root)
-    check_fits(root, geometry)
-    return geometry
 
 
 @pytest.fixture(scope="module")

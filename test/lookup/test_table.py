@@ -8,8 +8,7 @@ import pytest
 
 from wrist_stiffness.errors import LoadRangeError, TableError
 from wrist_stiffness.lookup.operators import column_sizes, pack, unpack
-from wrist_stiffness.lookup.rated_load import rated_map
-from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.response import rated_map, respond
 from wrist_stiffness.lookup.table_file import load_table, save_table
 from wrist_stiffness.mechanism.statics import contact_operators
 

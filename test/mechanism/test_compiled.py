@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table_file import load_table
-from wrist_stiffness.mechanism.compiled import CompiledWrist, native
-from wrist_stiffness.mechanism.compiled_constants import mechanism_constants
+from wrist_stiffness.mechanism.compiled import CompiledWrist, mechanism_constants, native
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.kinematics import Mechanism

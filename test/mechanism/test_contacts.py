@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism import contacts
-from wrist_stiffness.mechanism.contact import solve_contact
-from wrist_stiffness.mechanism.contacts import forces_of, solve_contacts
+from wrist_stiffness.mechanism import contact
+from wrist_stiffness.mechanism.contact import forces_of, solve_contact, solve_contacts
 
 ROUNDING = 1e-9
 """Relative; times the condition number of the flexibilities, 100."""
@@ -84,7 +83,7 @@ def test_compiled_and_plain_agree(case):
     gaps = np.stack([gap, -gap], axis=1)
     with pytest.MonkeyPatch.context() as plain:
         compiled = solve_contacts(approach, gaps), forces_of(approach, gaps, state)
-        plain.setattr(contacts, "native", None)
+        plain.setattr(contact, "native", None)
         (force, active), held = solve_contacts(approach, gaps), forces_of(approach, gaps, state)
     size = scale(approach, gap)[:, None]
     assert np.all(np.abs(compiled[0][0] - force) <= 100.0 * ROUNDING * size)

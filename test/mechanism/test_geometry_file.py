@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from changed_geometry import ORTHOGONAL, VALUES, changed, refused
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,16 +19,6 @@ from wrist_stiffness.mechanism.geometry_file import (
     load_geometry,
     mechanism_of,
 )
-
-ORTHOGONAL = Path(__file__).with_name("orthogonal_wrist.yaml")
-VALUES = yaml.safe_load(ORTHOGONAL.read_text())
-
-
-def changed(path, value):
-    """The values with another value at a place like ("site", "gravity_m_s2")."""
-    values = copy.deepcopy(VALUES)
-    reduce(lambda block, key: block[key], path[:-1], values)[path[-1]] = value
-    return values
 
 
 def without(path):
@@ -43,15 +34,6 @@ def leaves(values, path=()):
             yield from leaves(value, (*path, key))
         elif key not in ("source", "note"):
             yield (*path, key)
-
-
-def refused(values):
-    with pytest.raises(GeometryError) as caught:
-        geometry_from_values(values, "wrist.yaml")
-    message = str(caught.value)
-    assert "\n" not in message
-    assert message.startswith("wrist.yaml")
-    return message
 
 
 PLACES = list(leaves(VALUES))

@@ -1,33 +1,7 @@
 """Values of a geometry file that cannot be: each is refused with its place and its limit."""
 
-import copy
-from functools import reduce
-from pathlib import Path
-
 import pytest
-import yaml
-
-from wrist_stiffness.errors import GeometryError
-from wrist_stiffness.mechanism.geometry_file import geometry_from_values
-
-VALUES = yaml.safe_load(Path(__file__).with_name("orthogonal_wrist.yaml").read_text())
-
-
-def changed(path, value):
-    """The values with another value at a place like ("site", "gravity_m_s2")."""
-    values = copy.deepcopy(VALUES)
-    reduce(lambda block, key: block[key], path[:-1], values)[path[-1]] = value
-    return values
-
-
-def refused(values):
-    with pytest.raises(GeometryError) as caught:
-        geometry_from_values(values, "wrist.yaml")
-    message = str(caught.value)
-    assert "\n" not in message
-    assert message.startswith("wrist.yaml")
-    return message
-
+from changed_geometry import changed, refused
 
 CASES = {
     "wrong schema": (

@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import root
 
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
-from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.evaluation import situation_of
 from wrist_stiffness.model.law import Contribution
+from wrist_stiffness.model.places import cross_axes
 
 POSES = np.radians([[0.0, 0.0], [20.0, -10.0], [-35.0, 30.0], [40.0, 25.0]])
 

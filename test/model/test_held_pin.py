@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from wrist_stiffness.model import batch, pin_rest
-from wrist_stiffness.model.at_point import end_screws
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS
+from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.rubbing import Bristles, dragged, slip
-from wrist_stiffness.simulation.laws.joint_clearance import JointClearance
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
+from wrist_stiffness.simulation.laws.joint_play import JointClearance
 from wrist_stiffness.simulation.seat import Seat
 from wrist_stiffness.simulation.wrist import TrueWrist
 

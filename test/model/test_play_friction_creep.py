@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from wrist_stiffness.mechanism.components import JOINTS, PASSIVE_JOINTS
-from wrist_stiffness.model.at_point import cross_axes, end_screws
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.memory import lag, play
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
+from wrist_stiffness.model.places import cross_axes, end_screws
 from wrist_stiffness.model.rubbing import Bristles, pressing, slip
 
 RADIAL = 1e-5

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.effects.axis_misalignment import SHIFTS, TILTS
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
+from wrist_stiffness.model.places import cross_axes
 
 NEAR_SIDE = {"joint_2": "link_1", "joint_3": "link_3", "joint_4": "link_2"}
 """The link on the motor's side of a joint: the far side of the joint before."""

@@ -16,8 +16,7 @@ from wrist_stiffness.commands.node_list import UNANSWERED
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.ros import cell_simulator, executor
-from wrist_stiffness.ros.answer_count import AnswerCount
-from wrist_stiffness.ros.cell_simulator import CellSimulator
+from wrist_stiffness.ros.cell_simulator import AnswerCount, CellSimulator
 from wrist_stiffness.ros.recorder import Recorder
 
 QUIET_S = 0.5

@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from wrist_stiffness.errors import FrameError, StaleLoadError
-from wrist_stiffness.ros.health import Health
+from wrist_stiffness.ros.guarded_node import Health
 
 
 def values(status):

@@ -28,7 +28,8 @@ def test_a_parameter_on_the_page_is_that_of_the_nodes(name, shown, limits, text)
     for choice in entry.choices:
         assert choice in limits
     if isinstance(entry.default, int | float) and not isinstance(entry.default, bool):
-        assert limits == f"{entry.lower:g} … {entry.upper:g}"
+        least, largest = entry.limits
+        assert limits == f"{least:g} … {largest:g}"
     assert ("(at the start only)" in text) is entry.fixed
 
 

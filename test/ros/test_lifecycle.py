@@ -26,7 +26,7 @@ from wrist_stiffness.ros.conversions import joint_message, time_message
 from wrist_stiffness.ros.model_monitor import ModelMonitor
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
 from wrist_stiffness.ros.qos import STATE_QOS
-from wrist_stiffness.ros.trajectory_message import plan_payload, read_plan
+from wrist_stiffness.ros.stream_messages import plan_payload, read_plan
 
 SECOND = 1_000_000_000
 STEP = SECOND // 50

@@ -10,7 +10,7 @@ from wrist_stiffness.commands.wrist_drawing import WristDrawing
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.recording.cdr import decode
 from wrist_stiffness.recording.messages import MarkerArray as Drawn
-from wrist_stiffness.ros.body_transforms import body_transforms
+from wrist_stiffness.ros.conversions import body_transforms
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
 from wrist_stiffness.ros.qos import STATE_QOS
 

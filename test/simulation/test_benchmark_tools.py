@@ -7,7 +7,7 @@ from scipy.stats import binomtest, kstest
 from wrist_stiffness.commands.simulate import simulate_recording
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.sessions.reading.session import read_session
-from wrist_stiffness.simulation.residual import BasePose
+from wrist_stiffness.simulation.size import BasePose
 
 
 @pytest.mark.parametrize("sees", ["pose", "points", "pointing"])

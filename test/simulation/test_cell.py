@@ -6,7 +6,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell, true_laws
-from wrist_stiffness.simulation.pose_view import WILD_SHIFT
+from wrist_stiffness.simulation.instrument import WILD_SHIFT
 
 RATE = 50.0
 COUNT_ROUNDING = 1e-12  # rad

@@ -20,10 +20,10 @@ from wrist_stiffness.simulation.catalogue import (
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.heat import CAPACITY, HEATED, TO_ROOM, HeatNetwork
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
-from wrist_stiffness.simulation.laws.creep import Creep
-from wrist_stiffness.simulation.laws.inertia import Inertia
-from wrist_stiffness.simulation.laws.joint_clearance import JointClearance
+from wrist_stiffness.simulation.laws.bushing_polymer import Creep
+from wrist_stiffness.simulation.laws.joint_play import JointClearance
 from wrist_stiffness.simulation.laws.motor_turn import Backlash
+from wrist_stiffness.simulation.laws.point_mass import Inertia
 from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
 from wrist_stiffness.simulation.laws.time_delay import DelayLine
 from wrist_stiffness.simulation.seat import Seat

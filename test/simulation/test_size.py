@@ -12,8 +12,7 @@ from wrist_stiffness.simulation.blind import draw
 from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, is_plausible
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
-from wrist_stiffness.simulation.residual import residual
-from wrist_stiffness.simulation.size import Scale, magnitude_for
+from wrist_stiffness.simulation.size import Scale, magnitude_for, residual
 
 SECONDS, RATE = 20.0, 20.0
 SETTINGS = CellSettings(rate_hz=RATE, program_seconds=SECONDS)

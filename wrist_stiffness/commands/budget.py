@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.lookup.rated_load import RATED_FORCE
-from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.response import RATED_FORCE, respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration

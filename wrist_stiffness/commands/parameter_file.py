@@ -72,6 +72,5 @@ def _schema_of(entry: ParameterEntry) -> Schema[Any]:
         return truth
     if isinstance(entry.default, str):
         return text()
-    lower = -inf if entry.lower is None else entry.lower
-    upper = inf if entry.upper is None else entry.upper
+    lower, upper = entry.limits or (-inf, inf)
     return number(at_least=lower, at_most=upper)

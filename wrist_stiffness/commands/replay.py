@@ -18,7 +18,7 @@ from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
-from wrist_stiffness.compensation.trajectory import planned_point
+from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import RecordingError, WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.compensation.static_transforms import transform_of
+from wrist_stiffness.compensation.intake import transform_of
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.recording.batch import decode_batches

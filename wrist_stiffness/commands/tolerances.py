@@ -22,11 +22,11 @@ from wrist_stiffness.identification.free_effects import EVENLY_SPREAD, SHIM_UM
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.places import cross_axes
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.refitted import AXES, BUILT, GAPS

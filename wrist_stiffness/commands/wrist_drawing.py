@@ -15,7 +15,7 @@ from wrist_stiffness.mechanism.components import LINKS, Array
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.mechanism.vectors import triad
+from wrist_stiffness.mechanism.vectors import frame_about, triad
 from wrist_stiffness.recording.batch import Layout, Leaf, layout_of
 from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.messages import (
@@ -77,9 +77,8 @@ class WristDrawing:
         self._frame_id = frame_id
         self._arcs = {link: _arc(geometry, link) for link in LINKS}
         plate = geometry.platform
-        across = np.eye(3)[np.argmin(np.abs(plate.normal))]
         # A cylinder stands along its own z.
-        self._upright = np.roll(triad(plate.normal, across), -1, axis=1)
+        self._upright = np.roll(frame_about(plate.normal), -1, axis=1)
         self._templates: dict[int, tuple[bytes, Layout, dict[str, list[Leaf]]]] = {}
 
     def payloads(

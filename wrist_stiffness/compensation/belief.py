@@ -6,22 +6,130 @@ The compiled rules (`mechanism/native/supervisor.c`) are those of `supervisor.py
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.compensation.applied_share import RAMP_S, YIELD_S, AppliedShare
 from wrist_stiffness.compensation.payload import (
     ENOUGH,
     SIGMAS,
     Payload,
     PayloadEstimate,
+    Row,
     Thresholds,
 )
 from wrist_stiffness.compensation.scales import Scales
-from wrist_stiffness.compensation.supervision import State, SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Load
+
+
+class State(Enum):
+    """What is believed of the load, by the operators' names."""
+
+    UNSURE = "unsure"
+    FREE = "free"
+    HOLDING = "holding"
+    IN_CONTACT = "in contact"
+    RELEASED = "released"
+
+
+@dataclass(frozen=True)
+class SupervisorSettings:
+    """What counts as another load, and how far the model is trusted beside obstacles."""
+
+    # a load that departs by less is the same load.  Never below five times the scatter that the
+    # tare found
+    limit: Thresholds = Thresholds(0.05, 0.002)
+    # the wrist may be so many times stiffer or softer than the model, 1 or more [-]
+    model_doubt: float = 2.0
+    # correct for every load as it is measured, and in full.  Only where it cannot be a contact
+    follow: bool = False
+
+    @property
+    def trust(self) -> float:
+        """Part of the predicted correction that never goes past the aim [-].
+
+        Of an error e a model that is r times too soft predicts r e, and a part c of that leaves
+        (1 - c r) e.  With c = 1/q that stays between 0 and e for all r from 1/q to q: the platform
+        comes nearer to its aim and never gets past it.  Past the aim it could leave an obstacle
+        that bears a part of the error without correction, and would be farther off than that; no
+        sensor would see it, for nothing touches any more.
+        """
+        return 1.0 if self.follow else 1.0 / self.model_doubt
+
+
+@dataclass(frozen=True)
+class Supervision:
+    """What the supervisor believed at a moment."""
+
+    state: State  # by the operators' names
+    text: str  # why the correction is restricted; empty where it is not
+    payload: Payload | None  # what is corrected for
+    told: bool  # whether the gripper told that payload
+    # part of the correction that is applied, of what the model is trusted with; below 1 where it
+    # yielded to a contact or is not certain [-]
+    share: float
+    valid: bool  # whether the load is known and corrected for, so that the residual holds
+    # `stamp_ns`, `since_ns`: of the last command, and of the one at which the state began [ns]
+    stamp_ns: int
+    since_ns: int
+
+
+RAMP_S = 1.0
+"""A correction comes in over this time, and goes where nobody knows what is carried [s]."""
+
+YIELD_S = 0.1
+"""A correction that a contact works against is gone after this time, in which the default
+slew limit takes back 50 mdeg [s]."""
+
+
+class AppliedShare:
+    """Part of a correction that is applied.
+
+    While the moment of a contact works against the correction's turn, the part falls towards none.
+    It comes back when the command has left that place, never before, so that nothing can oscillate.
+    """
+
+    def __init__(self) -> None:
+        self.value = 1.0  # [-]
+        # whether it is known what is carried; where it is not, the correction fades
+        self.sure = False
+        # (3,), moment of a contact, along u, v and down; None where there is none [N m]
+        self.against: Row | None = None
+        self.place: list[float] | None = None  # (2,), command at which the correction yielded [rad]
+
+    @property
+    def settled(self) -> bool:
+        """Whether all is applied whatever the correction, and goes on to be."""
+        return self.against is None and self.sure and self.value == 1.0
+
+    def leave(self, theta: list[float], reach: float) -> None:
+        """Hear of a command (2,) [rad]; one farther than `reach` [rad] has left the place."""
+        if self.place is not None and apart(theta, self.place) > reach:
+            self.place = None
+
+    def after(self, seconds: float, turn: Row) -> float:
+        """Let time [s] pass with a correction that turns the platform by (3,), along u, v, down."""
+        if self.against is not None and _dot(self.against, turn) < 0.0:
+            self.value = max(0.0, self.value - seconds / YIELD_S)
+        elif not self.sure:
+            self.value = max(0.0, self.value - seconds / RAMP_S)
+        elif self.against is None and self.place is None:
+            self.value = min(1.0, self.value + seconds / RAMP_S)
+        return self.value
+
+
+def apart(theta: list[float], other: list[float]) -> float:
+    """Return how far two commands (2,) are apart, the larger of both motors [rad]."""
+    return max(abs(theta[0] - other[0]), abs(theta[1] - other[1]))
+
+
+def _dot(a: Row, b: Row) -> float:
+    # Not `sum`, which rounds otherwise from Python 3.12 on.
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
 
 JUDGE_S = 0.1
 """A contact, a release or a new weight that departs by one threshold is believed after this time,

@@ -11,7 +11,7 @@ import numpy as np
 from wrist_stiffness.compensation.correction import Correction
 from wrist_stiffness.compensation.measured_pose import NOT_MEASURED
 from wrist_stiffness.compensation.pose import seen_from
-from wrist_stiffness.compensation.trajectory import PlannedPoint
+from wrist_stiffness.compensation.trajectory_plan import PlannedPoint
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array

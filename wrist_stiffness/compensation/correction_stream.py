@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.compensation.belief import Supervision
 from wrist_stiffness.compensation.corrected import (
     CorrectedBlock,
     CorrectedCommand,
@@ -16,18 +17,15 @@ from wrist_stiffness.compensation.corrected import (
 )
 from wrist_stiffness.compensation.corrector import Correcting, Corrector
 from wrist_stiffness.compensation.intake import COMMAND
-from wrist_stiffness.compensation.judged_load import judged_load
 from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
 from wrist_stiffness.compensation.payload import Thresholds
-from wrist_stiffness.compensation.perishable import require_within_limits, within_limits
+from wrist_stiffness.compensation.safety import require_within_limits, within_limits
 from wrist_stiffness.compensation.scales import Held
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
-from wrist_stiffness.compensation.supervision import Supervision
 from wrist_stiffness.compensation.supervisor import Supervisor
-from wrist_stiffness.compensation.trajectory import PlannedPoint
-from wrist_stiffness.compensation.trajectory_plan import PlanCorrector
-from wrist_stiffness.errors import InputError, StaleLoadError, WristError
+from wrist_stiffness.compensation.trajectory_plan import PlanCorrector, PlannedPoint
+from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, WristError
 from wrist_stiffness.mechanism.compiled import CompiledCommands, CompiledSupervisor
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
@@ -114,26 +112,12 @@ class CorrectionStream(Stream):
     ) -> CorrectedCommand:
         """Correct a command.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Its stamp [ns].
-        frame_id : str
-            Its header's frame; `wrist_corrected` marks a command that was corrected already.
-        names, positions, velocities : sequence
-            As in sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are
-            taken as differences of the angles.
-
-        Returns
-        -------
-        CorrectedCommand
-            With the fault, and on the way to no correction, wherever one cannot be had safely.
-
-        Raises
-        ------
-        InputError
-            If a motor is missing, an angle is not finite or beyond the joint limits: such a command
-            is not to be forwarded.
+        `stamp_ns`: its stamp [ns].  `frame_id`: its header's frame; `wrist_corrected` marks a
+        command that was corrected already.  `names`, `positions`, `velocities`: as in
+        sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are taken as
+        differences of the angles.  Gives `CorrectedCommand`: with the fault, and on the way to no
+        correction, wherever one cannot be had safely.  Raises `InputError` if a motor is missing,
+        an angle is not finite or beyond the joint limits: such a command is not to be forwarded.
         """
         theta = self._motor_angles(names, positions)
         theta_dot = self.settings.motors.speeds(names, velocities)
@@ -328,8 +312,7 @@ class CorrectionStream(Stream):
         """Return the load to correct for, or why there is none."""
         try:
             _, measured = self.loads.at(stamp_ns)
-            table = self.running_model().model.table
-            load = judged_load(self.supervisor, self.settings, table, stamp_ns, theta, measured)
+            load = self._load_for(stamp_ns, theta, measured)
         except WristError as error:
             if isinstance(error, StaleLoadError):
                 self.supervisor.lost()
@@ -338,6 +321,26 @@ class CorrectionStream(Stream):
             # With another payload the hysteresis begins anew.
             self._corrector.release()
         return load, None
+
+    def _load_for(self, stamp_ns: int, theta: Array, measured: Load) -> Load:
+        """Return what the supervisor makes of a measured load at a command (2,) [rad].
+
+        Raises `WristError` if the angles or the measured load are beyond the table.
+        """
+        supervisor, settings = self.supervisor, self.settings
+        table = self.running_model().model.table
+        if settings.supervisor.follow:
+            supervisor.follow(stamp_ns, measured)
+            return measured
+        try:
+            reading = supervisor.scales(table.geometry).read(table, theta, measured)
+        except LoadRangeError:
+            supervisor.overloaded(stamp_ns, theta.tolist())
+            raise
+        judged = supervisor.judge(
+            stamp_ns, theta.tolist(), reading, settings.supervisor, settings.correction_limit
+        )
+        return Load(np.zeros(6) if judged is None else np.array(judged))
 
     def _correct_one(self, block: Correcting, place: int, judged: bool) -> None:
         """Correct a command of a block that the compiled formulas cannot serve, as a live one."""
@@ -355,12 +358,11 @@ class CorrectionStream(Stream):
         Where no commands come, the loads before the plan are judged as at its first point.
         """
         self.loads.at(stamp_ns)
-        table, supervisor = self.running_model().model.table, self.supervisor
-        start_ns = max(supervisor.supervision.stamp_ns, stamp_ns - PLAN_WINDOW_NS)
+        start_ns = max(self.supervision.stamp_ns, stamp_ns - PLAN_WINDOW_NS)
         if first is not None:
             for load_ns, load in self.loads.since(start_ns, stamp_ns):
-                judged_load(supervisor, self.settings, table, load_ns, first, load)
-        return supervisor.held(self.settings.supervisor)
+                self._load_for(load_ns, first, load)
+        return self.supervisor.held(self.settings.supervisor)
 
 
 def _load_at(commands: CompiledCommands, place: int) -> Load:

@@ -1,17 +1,24 @@
-"""Convert in: motor angles by name, wrenches from any sensor frame to O."""
+"""Convert in: motor angles by name, wrenches from any sensor frame to O.
+
+Sensor frames come from a mapping (YAML) or from `/tf_static`: chains of fixed transforms that end
+at base or platform.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import FrameError, InputError
+from wrist_stiffness.inputs.document import yaml_node
+from wrist_stiffness.inputs.schema import Quantity, mapping_of, record, text, vector
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.block import Load
@@ -203,3 +210,117 @@ class Frames:
                 f"(known: {', '.join(known)})"
             )
         return known[name]
+
+
+def _sensor_frame(
+    parent: str,
+    position: Array | None = None,
+    rpy: Array | None = None,
+    acts_on: Literal["platform", "environment"] = "platform",
+) -> SensorFrame:
+    turned = Rotation.from_euler("xyz", np.zeros(3) if rpy is None else rpy)
+    return SensorFrame(
+        parent, turned.as_matrix(), np.zeros(3) if position is None else position, acts_on
+    )
+
+
+FRAME = record(
+    {"parent": text(BASE_FRAME, PLATFORM_FRAME)},
+    {
+        "position_mm": Quantity(vector()),
+        "rpy_deg": Quantity(vector()),
+        "acts_on": text("platform", "environment"),
+    },
+    make=_sensor_frame,
+)
+
+
+def frames_from_yaml(mapping: str) -> Frames:
+    """Read sensor frames from a YAML mapping by frame_id.
+
+    For example ``{ft: {parent: wrist_platform, position_mm: [0, 0, 40], rpy_deg: [0, 0, 90],
+    acts_on: environment}}``; roll, pitch and yaw turn about the parent's fixed x, y and z.
+
+    `mapping`: empty for none.  Raises `InputError` if it is no such mapping; the message names the
+    frame and the key.
+    """
+    root = yaml_node(mapping, "frames", InputError)
+    if root.value is None:
+        return Frames()
+    frames = {}
+    for key, frame in mapping_of(FRAME)(root).items():
+        name = frame_name(key)
+        if name in (BASE_FRAME, PLATFORM_FRAME):
+            raise root[key].refuse("is fixed and cannot be mapped")
+        frames[name] = frame
+    return Frames(frames)
+
+
+UNIT_TOLERANCE = 1e-3
+"""Largest deviation of a quaternion's norm from one."""
+
+
+@dataclass(frozen=True)
+class StaticTransform:
+    """Where a child frame stands in its parent."""
+
+    parent: str
+    child: str
+    rotation: Array  # (3, 3), turns the child's components into the parent's
+    position: Array  # (3,), the child's origin in the parent [m]
+
+
+def static_transform(
+    parent: str, child: str, position: Sequence[float], quaternion: Sequence[float]
+) -> StaticTransform:
+    """Return a transform as geometry_msgs/TransformStamped states it.
+
+    `parent`, `child`: `header.frame_id` and `child_frame_id`; `position`, `quaternion` (sequence of
+    3 and 4 float) [m], x y z w.  Raises `InputError` if a number is not finite or the quaternion is
+    no unit quaternion.
+    """
+    numbers = np.array([*position, *quaternion], dtype=float)
+    norm = float(np.linalg.norm(numbers[3:]))
+    if not np.all(np.isfinite(numbers)) or abs(norm - 1.0) > UNIT_TOLERANCE:
+        raise InputError(f"static transform {parent} -> {child}: {numbers.tolist()} is none")
+    names = frame_name(parent), frame_name(child)
+    return StaticTransform(*names, Rotation.from_quat(numbers[3:]).as_matrix(), numbers[:3])
+
+
+def transform_of(message: Any) -> StaticTransform:
+    """Return a geometry_msgs/TransformStamped, of ROS or of a recording, as `static_transform`."""
+    place, turn = message.transform.translation, message.transform.rotation
+    return static_transform(
+        message.header.frame_id,
+        message.child_frame_id,
+        (place.x, place.y, place.z),
+        (turn.x, turn.y, turn.z, turn.w),
+    )
+
+
+def sensor_frames(transforms: Iterable[StaticTransform]) -> dict[str, SensorFrame]:
+    """Return every frame that hangs at `wrist_base` or `wrist_platform`, over any number of steps.
+
+    `transforms`: in any order, followed in both directions.  Gives frames by name.  A sensor's own
+    transform does not say on what its wrench acts: on the platform.  Between base and platform
+    there is nothing fixed, so a chain ends at either.
+    """
+    found = {name: SensorFrame(name) for name in (BASE_FRAME, PLATFORM_FRAME)}
+    left = list(transforms)
+    while True:
+        rest = []
+        for step in left:
+            if step.parent in found and step.child not in found:
+                at = found[step.parent]
+                turn, place = at.rotation @ step.rotation, at.rotation @ step.position
+                found[step.child] = SensorFrame(at.parent, turn, at.position + place)
+            elif step.child in found and step.parent not in found:
+                at = found[step.child]
+                turn = at.rotation @ step.rotation.T
+                place = at.position - turn @ step.position
+                found[step.parent] = SensorFrame(at.parent, turn, place)
+            else:
+                rest.append(step)
+        if len(rest) == len(left):
+            return {name: frame for name, frame in found.items() if name != frame.parent}
+        left = rest

@@ -59,14 +59,8 @@ class LoadHistory:
         self._on_platform = np.empty(2 * self.CAPACITY, dtype=bool)
 
     @property
-    def age_limit_s(self) -> float:
-        """Oldest load that is still used [s]."""
-        return self._age_limit_s
-
-    @age_limit_s.setter
-    def age_limit_s(self, age_limit_s: float) -> None:
-        self._age_limit_s = age_limit_s
-        self._age_limit_ns = round(age_limit_s * NANOSECONDS)
+    def _age_limit_ns(self) -> int:
+        return round(self.age_limit_s * NANOSECONDS)
 
     def __len__(self) -> int:
         """Return how many loads are kept."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.compensation.intake import Frames
+from wrist_stiffness.compensation.intake import UNIT_TOLERANCE, Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.readout import fit_markers
@@ -18,13 +19,12 @@ from wrist_stiffness.mechanism.components import Array
 NOT_MEASURED = 1.0
 """A variance of this or more says that a component is not measured [m^2, rad^2]."""
 
-UNIT_TOLERANCE = 1e-3
-"""Largest deviation of a quaternion's norm from one."""
-
 FARTHEST_M = 1e3
 """No instrument measures a wrist from farther away; its square is still a number."""
 
 FRAME_POSES_KEPT = 256
+
+Stamped = TypeVar("Stamped", bound=tuple[Any, ...])
 
 
 def measured_pose(
@@ -57,29 +57,11 @@ def pose_of_markers(
 ) -> tuple[Array, Array]:
     """Return the platform's pose in F from the places of its markers.
 
-    Parameters
-    ----------
-    frames : Frames
-        Frames in which they may come.
-    points : (n, 3) array_like
-        Measured [m]; a marker with a NaN is lost.
-    nominal : (n, 3) float
-        The same points of the platform in U [m].
-
-    Returns
-    -------
-    rotation : (3, 3) float
-        U -> F.
-    position : (3,) float
-        Of the platform's point at O in F [m].
-
-    Raises
-    ------
-    FrameError
-        If the frame is neither `wrist_base` nor mapped to it.
-    InputError
-        If another number of points comes, fewer than three that are not on a line are seen, or a
-        coordinate is infinite or beyond reason.
+    `frames`: frames in which they may come; `points` (n, 3): measured [m], a marker with a NaN is
+    lost; `nominal` (n, 3): the same points of the platform in U [m].  Gives `rotation` (3, 3): U ->
+    F, and `position` (3,): of the platform's point at O in F [m].  Raises `FrameError` if the frame
+    is neither `wrist_base` nor mapped to it; `InputError` if another number of points comes, fewer
+    than three that are not on a line are seen, or a coordinate is infinite or beyond reason.
     """
     turn, origin = frames.in_base(frame_id, "measured markers")
     places = np.reshape(np.asarray(points, dtype=float), (-1, 3))
@@ -98,6 +80,23 @@ def _require_near(places: Array, what: str) -> None:
     farthest = float(np.max(np.abs(places), initial=0.0, where=~np.isnan(places)))
     if farthest > FARTHEST_M:
         raise InputError(f"{what}: a coordinate of {farthest:.4g} m is beyond {FARTHEST_M:g} m")
+
+
+def newest_before(kept: deque[Stamped], stamp_ns: int, age_limit_s: float, what: str) -> Stamped:
+    """Return the newest of what is kept, stamp [ns] first, that is not younger than a pose.
+
+    `what`: is kept, for the message.  Raises `InputError` if there is none, or it is too old.
+    """
+    newest = next((each for each in reversed(kept) if each[0] <= stamp_ns), None)
+    if newest is None:
+        raise InputError(f"measured pose: no {what} with a stamp before it")
+    age_ns = stamp_ns - newest[0]
+    if age_ns > round(age_limit_s * NANOSECONDS):
+        raise InputError(
+            f"measured pose: newest {what} is {age_ns / NANOSECONDS:.3f} s older "
+            f"(limit {age_limit_s:g} s)"
+        )
+    return newest
 
 
 class FrameMotion:
@@ -129,15 +128,7 @@ class FrameMotion:
         """
         if self._first is None:
             return rotation, position
-        newest = next((kept for kept in reversed(self._poses) if kept[0] <= stamp_ns), None)
-        if newest is None:
-            raise InputError("measured pose: no pose of the frame with a stamp before it")
-        age_s = (stamp_ns - newest[0]) / NANOSECONDS
-        if age_s > self._age_limit_s:
-            raise InputError(
-                f"measured pose: newest pose of the frame is {age_s:.3f} s older "
-                f"(limit {self._age_limit_s:g} s)"
-            )
+        newest = newest_before(self._poses, stamp_ns, self._age_limit_s, "pose of the frame")
         # F now, as seen from F at first: T_now T_first^-1.
         turn = newest[1] @ self._first[0].T
         moved = newest[2] - turn @ self._first[1]

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.measured_pose import (
     NOT_MEASURED,
     FrameMotion,
     measured_pose,
+    newest_before,
     pose_of_markers,
 )
 from wrist_stiffness.compensation.monitor import (
@@ -27,7 +27,6 @@ from wrist_stiffness.compensation.monitor import (
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 
@@ -64,7 +63,7 @@ class MonitorStream(Stream):
     ) -> None:
         super().__init__(model, settings)
         self._monitoring = monitoring
-        self._age_limit_ns = round(joint_age_limit_s * NANOSECONDS)
+        self._joint_age_limit_s = joint_age_limit_s
         self._joints: deque[JointStateKept] = deque(maxlen=JOINT_STATES_KEPT)
         # motion of the wrist's frame, where a target on it is measured
         self.frame = FrameMotion(frame_age_limit_s)
@@ -94,26 +93,11 @@ class MonitorStream(Stream):
     ) -> MonitoredPose:
         """Compare a measured pose with the prediction.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Its stamp [ns].
-        frame_id : str
-            `wrist_base`, or mapped to it.
-        position, quaternion : sequence of 3 and 4 float
-            Of the platform, U -> F; [m], x y z w.
-        variance : (6,) float, optional
-            Of the measurement, where it says so; huge where not measured [m^2, rad^2].
-
-        Returns
-        -------
-        MonitoredPose
-            To be published with the pose's stamp.
-
-        Raises
-        ------
-        WristError
-            If the pose is not usable or no joint state, load or pose of the frame belongs to it.
+        `stamp_ns`: its stamp [ns].  `frame_id`: `wrist_base`, or mapped to it.  `position`,
+        `quaternion`: of the platform, U -> F; [m], x y z w.  `variance` (6,): of the measurement,
+        where it says so; huge where not measured [m^2, rad^2].  Gives `MonitoredPose`: to be
+        published with the pose's stamp.  Raises `WristError` if the pose is not usable or no joint
+        state, load or pose of the frame belongs to it.
         """
         rotation, place = measured_pose(self.loads.frames, frame_id, position, quaternion)
         if variance is not None:
@@ -149,7 +133,9 @@ class MonitorStream(Stream):
         self, stamp_ns: int, rotation: Array, position: Array, variance: Array | None
     ) -> MonitoredPose:
         rotation, position = self.frame.taken_out(stamp_ns, rotation, position)
-        theta, theta_dot = self._joints_at(stamp_ns)
+        _, theta, theta_dot = newest_before(
+            self._joints, stamp_ns, self._joint_age_limit_s, "joint state"
+        )
         running = self.running_model()
         prediction = running.advance(stamp_ns, theta, self.loads.at(stamp_ns)[1], theta_dot)
         residual = residual_of_pose(rotation, position, prediction)
@@ -162,15 +148,3 @@ class MonitorStream(Stream):
         excess = noise - self._monitoring.noise**2
         self.monitor.add(residual, np.diag(prediction.covariance) + excess)
         return MonitoredPose(residual, prediction.covariance + np.diag(noise), prediction.warnings)
-
-    def _joints_at(self, stamp_ns: int) -> tuple[Array, Array | None]:
-        newest = next((kept for kept in reversed(self._joints) if kept[0] <= stamp_ns), None)
-        if newest is None:
-            raise InputError("measured pose: no joint state with a stamp before it")
-        joint_stamp_ns, theta, theta_dot = newest
-        if stamp_ns - joint_stamp_ns > self._age_limit_ns:
-            raise InputError(
-                f"measured pose: newest joint state is {(stamp_ns - joint_stamp_ns) * 1e-9:.3f} s "
-                f"older (limit {self._age_limit_ns * 1e-9:g} s)"
-            )
-        return theta, theta_dot

@@ -13,7 +13,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.vectors import skew, triad
+from wrist_stiffness.mechanism.vectors import frame_about, skew
 
 DEPENDENT = 1e-6
 """The motors' columns of the task are dependent below this ratio of their singular values."""
@@ -40,8 +40,7 @@ class Objective:
         rotation = np.eye(3)
         if self.name == "pointing":
             normal = configuration.platform @ self.normal
-            start = np.eye(3)[np.argmin(np.abs(normal))]
-            rotation = triad(normal, start)[:, 1:].T
+            rotation = frame_about(normal)[:, 1:].T
         return np.hstack([np.zeros_like(rotation), rotation])
 
     def cancelling(self, configuration: Configuration, jacobian: Array) -> Array:

@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.compensation.frames_yaml import frames_from_yaml
-from wrist_stiffness.compensation.intake import Frames, MotorNames, checked_prefix
+from wrist_stiffness.compensation.belief import SupervisorSettings
+from wrist_stiffness.compensation.intake import Frames, MotorNames, checked_prefix, frames_from_yaml
 from wrist_stiffness.compensation.monitor import MonitorSettings
 from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.errors import InputError
 
 ParameterValue = bool | int | float | str
@@ -32,9 +31,7 @@ class ParameterEntry:
     name: str  # with its unit at the end where it has one
     default: ParameterValue  # also says the type
     text: str  # what it does, one line
-    # `lower`, `upper`: range of a number
-    lower: float | None = None
-    upper: float | None = None
+    limits: tuple[float, float] | None = None  # least and largest number; None for any
     choices: tuple[str, ...] = ()  # allowed texts; empty for any
     fixed: bool = False  # can only be set at the start
 
@@ -65,8 +62,7 @@ COMMON = (
         "model_load_limit_s",
         30.0,
         "longest time that the loading of a model may take [s]",
-        lower=0.1,
-        upper=3600.0,
+        (0.1, 3600.0),
     ),
     ParameterEntry(
         "allow_python_laws",
@@ -81,8 +77,7 @@ COMMON = (
         "tare_age_limit_s",
         3600.0,
         "oldest tare that is taken up again after a restart [s]",
-        lower=0.0,
-        upper=604800.0,
+        (0.0, 604800.0),
     ),
     ParameterEntry(
         "state_folder",
@@ -102,15 +97,12 @@ COMMON = (
     ParameterEntry(
         "covariates", "", "names of /covariates/NAME that the model uses, with blanks", fixed=True
     ),
-    ParameterEntry(
-        "load_age_limit_s", 0.5, "oldest load that is still used [s]", lower=0.001, upper=3600.0
-    ),
+    ParameterEntry("load_age_limit_s", 0.5, "oldest load that is still used [s]", (0.001, 3600.0)),
     ParameterEntry(
         "signal_age_limit_s",
         300.0,
         "oldest temperature or covariate that is still used [s]",
-        lower=0.001,
-        upper=86400.0,
+        (0.001, 86400.0),
     ),
 )
 
@@ -120,30 +112,16 @@ PREDICTION = (
         0.0,
         "standard deviation of a force component; with load_moment_noise_nm 0 it is left out of "
         "the covariance [N]",
-        lower=0.0,
-        upper=1000.0,
+        (0.0, 1000.0),
     ),
     ParameterEntry(
-        "load_moment_noise_nm",
-        0.0,
-        "the same of a moment component at O [N m]",
-        lower=0.0,
-        upper=100.0,
+        "load_moment_noise_nm", 0.0, "the same of a moment component at O [N m]", (0.0, 100.0)
     ),
     ParameterEntry(
-        "load_wait_s",
-        0.0,
-        "longest wait for the load of a joint state [s]",
-        lower=0.0,
-        upper=1.0,
-        fixed=True,
+        "load_wait_s", 0.0, "longest wait for the load of a joint state [s]", (0.0, 1.0), fixed=True
     ),
-    ParameterEntry(
-        "marker_rate_hz", 10.0, "of /wrist_markers; 0 for none [1/s]", lower=0.0, upper=100.0
-    ),
-    ParameterEntry(
-        "marker_exaggeration", 1000.0, "factor on the error drawn [-]", lower=0.0, upper=1e6
-    ),
+    ParameterEntry("marker_rate_hz", 10.0, "of /wrist_markers; 0 for none [1/s]", (0.0, 100.0)),
+    ParameterEntry("marker_exaggeration", 1000.0, "factor on the error drawn [-]", (0.0, 1e6)),
 )
 
 PASS_THROUGH, STOP = "pass_through", "stop"
@@ -161,40 +139,33 @@ CORRECTION = (
         0.5,
         "oldest command that is forwarded, like the reference timeout of ros2_control; 0 for any "
         "[s]",
-        lower=0.0,
-        upper=3600.0,
+        (0.0, 3600.0),
     ),
     ParameterEntry("objective", "pointing", "what the motors make right", choices=OBJECTIVES),
     ParameterEntry(
         "correction_limit_deg",
         0.5,
         "where a motor would need more than this there is no correction [deg]",
-        lower=0.0,
-        upper=5.0,
+        (0.0, 5.0),
     ),
-    ParameterEntry(
-        "slew_deg_s", 0.5, "fastest change of a correction [deg/s]", lower=0.001, upper=1000.0
-    ),
+    ParameterEntry("slew_deg_s", 0.5, "fastest change of a correction [deg/s]", (0.001, 1000.0)),
     ParameterEntry(
         "deadband_steps",
         0.15,
         "error that a motor may leave before its correction moves [encoder steps]",
-        lower=0.0,
-        upper=10.0,
+        (0.0, 10.0),
     ),
     ParameterEntry(
         "domain_fade_deg",
         2.0,
         "the correction fades within this distance from the border of the domain [deg]",
-        lower=0.001,
-        upper=45.0,
+        (0.001, 45.0),
     ),
     ParameterEntry(
         "singularity_fade",
         0.05,
         "the correction fades within this distance of |D| from its limit [-]",
-        lower=0.001,
-        upper=0.5,
+        (0.001, 0.5),
     ),
     ParameterEntry(
         "load_policy",
@@ -208,84 +179,57 @@ CORRECTION = (
         2.0,
         "the wrist may be so many times stiffer or softer than the model; with load_policy judge "
         "1/x of the correction is applied, which never goes past the aim [-]",
-        lower=1.0,
-        upper=10.0,
+        (1.0, 10.0),
     ),
     ParameterEntry(
         "contact_force_n",
         0.05,
         "force by which a load departs that is another load; never below five times the scatter "
         "that the tare found [N]",
-        lower=0.001,
-        upper=1000.0,
+        (0.001, 1000.0),
     ),
-    ParameterEntry(
-        "contact_moment_nm",
-        0.002,
-        "the same of a moment at O [N m]",
-        lower=0.00001,
-        upper=100.0,
-    ),
+    ParameterEntry("contact_moment_nm", 0.002, "the same of a moment at O [N m]", (0.00001, 100.0)),
 )
 
 POSE_TYPES = ("PoseStamped", "PoseWithCovarianceStamped")
 
-MONITOR = (
-    ParameterEntry(
-        "pose_type",
-        POSE_TYPES[0],
-        "message type of /platform_pose_measured",
-        choices=POSE_TYPES,
-        fixed=True,
-    ),
-    ParameterEntry(
-        "noise_s_um",
-        1.0,
-        "standard deviation of a measured coordinate [um]",
-        lower=0.001,
-        upper=1e6,
-        fixed=True,
-    ),
-    ParameterEntry(
-        "noise_phi_mdeg",
-        2.0,
-        "standard deviation of a measured angle [mdeg]",
-        lower=0.001,
-        upper=1e6,
-        fixed=True,
-    ),
-    ParameterEntry(
-        "joint_age_limit_s",
-        0.02,
-        "oldest joint state that is matched with a pose [s]",
-        lower=0.0,
-        upper=10.0,
-        fixed=True,
-    ),
-    ParameterEntry(
-        "frame_age_limit_s",
-        1.0,
-        "oldest pose of the frame that is taken out of a pose, once one was measured [s]",
-        lower=0.0,
-        upper=3600.0,
-        fixed=True,
-    ),
-    ParameterEntry(
-        "baseline_samples",
-        500,
-        "poses from which the baseline is learned",
-        lower=1,
-        upper=1e6,
-        fixed=True,
-    ),
-    ParameterEntry(
-        "alarm_threshold",
-        15.0,
-        "sum of deviations at which there is an alarm [standard deviations]",
-        lower=1.0,
-        upper=1e6,
-        fixed=True,
-    ),
+MONITOR = tuple(
+    replace(entry, fixed=True)
+    for entry in (
+        ParameterEntry(
+            "pose_type",
+            POSE_TYPES[0],
+            "message type of /platform_pose_measured",
+            choices=POSE_TYPES,
+        ),
+        ParameterEntry(
+            "noise_s_um", 1.0, "standard deviation of a measured coordinate [um]", (0.001, 1e6)
+        ),
+        ParameterEntry(
+            "noise_phi_mdeg", 2.0, "standard deviation of a measured angle [mdeg]", (0.001, 1e6)
+        ),
+        ParameterEntry(
+            "joint_age_limit_s",
+            0.02,
+            "oldest joint state that is matched with a pose [s]",
+            (0.0, 10.0),
+        ),
+        ParameterEntry(
+            "frame_age_limit_s",
+            1.0,
+            "oldest pose of the frame that is taken out of a pose, once one was measured [s]",
+            (0.0, 3600.0),
+        ),
+        ParameterEntry(
+            "baseline_samples", 500, "poses from which the baseline is learned", (1, 1e6)
+        ),
+        ParameterEntry(
+            "alarm_threshold",
+            15.0,
+            "sum of deviations at which there is an alarm [standard deviations]",
+            (1.0, 1e6),
+        ),
+    )
 )
 
 

@@ -86,12 +86,7 @@ class RunningModel:
     def _predict(self, theta: Array, load: Load) -> Prediction:
         # The flanges that touched last are a good guess.  It saves time and leaves no trace: the
         # forces are solved for once more from the flanges that are found, whatever the guess was.
-        try:
-            prediction = self.model.predict(theta, load, self.contact)
-        except WristError:
-            raise
-        except Exception as error:
-            raise _fault(error) from error
+        prediction = _told(lambda: self.model.predict(theta, load, self.contact))
         self.contact[:] = prediction.active
         return prediction
 
@@ -112,14 +107,10 @@ class RunningModel:
 
 
 def _told(predict: Callable[[], Prediction]) -> Prediction:
+    """Predict; whatever a user's own law raises becomes an error of the input."""
     try:
         return predict()
     except WristError:
         raise
     except Exception as error:
-        raise _fault(error) from error
-
-
-def _fault(error: Exception) -> InputError:
-    """Return the fault that it is when a user's own law fails, in any way."""
-    return InputError(f"the model fails: {type(error).__name__}: {error}")
+        raise InputError(f"the model fails: {type(error).__name__}: {error}") from error

@@ -12,7 +12,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.compiled import Flags, native
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.vectors import triad
+from wrist_stiffness.mechanism.vectors import frame_about
 from wrist_stiffness.model.error_model import IN_F, IN_U, Load
 
 
@@ -26,8 +26,7 @@ class Scales:
         self.geometry = geometry
         self._g = float(np.linalg.norm(geometry.gravity))
         down = geometry.gravity / self._g if self._g else np.array([0.0, 0.0, -1.0])
-        frame = triad(down, np.eye(3)[np.argmin(np.abs(down))])
-        self._axes: list[list[float]] = [*frame[:, 1:].T.tolist(), down.tolist()]
+        self._axes: list[list[float]] = [*frame_about(down)[:, 1:].T.tolist(), down.tolist()]
         # (10,), axes u, v and down, and gravity, as compiled formulas take them
         self.constants = np.append(self._axes, self._g)
 

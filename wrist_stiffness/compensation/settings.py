@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.intake import Frames, MotorNames
 from wrist_stiffness.compensation.objective import ObjectiveName
 from wrist_stiffness.compensation.safety import SafetySettings
-from wrist_stiffness.compensation.supervision import SupervisorSettings
 from wrist_stiffness.mechanism.components import Array
 
 

@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.held_signals import HeldSignals
-from wrist_stiffness.compensation.intake import Frames
-from wrist_stiffness.compensation.load_covariance import load_covariance
+from wrist_stiffness.compensation.intake import Frames, StaticTransform, sensor_frames
 from wrist_stiffness.compensation.load_history import LoadIntake, Zero
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.static_transforms import StaticTransform, sensor_frames
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.model.error_model import ErrorModel, Prediction
+from wrist_stiffness.mechanism.statics import contact_operators
+from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.model.error_model import ErrorModel, Load, Prediction
 
 
 class Stream:
@@ -142,23 +142,11 @@ class PredictionStream(Stream):
     ) -> PredictedSample:
         """Predict for a joint state.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Its stamp [ns].
-        names, positions, velocities : sequence
-            As in sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are
-            taken as differences of the angles.
-
-        Returns
-        -------
-        PredictedSample
-            To be published with the joint state's stamp.
-
-        Raises
-        ------
-        WristError
-            If the sample, the pose or the load cannot be used: nothing is to be published.
+        `stamp_ns`: its stamp [ns]; `names`, `positions`, `velocities`: as in
+        sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are taken as
+        differences of the angles.  Gives `PredictedSample`: to be published with the joint state's
+        stamp.  Raises `WristError` if the sample, the pose or the load cannot be used: nothing is
+        to be published.
         """
         motors = self.settings.motors
         theta, theta_dot = motors.angles(names, positions), motors.speeds(names, velocities)
@@ -218,3 +206,27 @@ class PredictionStream(Stream):
             found.configuration[place] = one.configuration.row
             found.warnings.update((*one.warnings, *self.dropped_signals))
         return found
+
+
+def load_covariance(model: ErrorModel, prediction: Prediction, load: Load, noise: Array) -> Array:
+    """Return the covariance of the twist that comes from the load.
+
+    `model`: made the prediction.  `prediction`: at the pose and under the load; its flange sectors
+    in contact stay so.  `load`: says in which axes the noise is.  `noise` (6,): standard deviation
+    of force and moment at O [N, N m].  Gives (6, 6): of the twist at O in F [m, rad].
+    """
+    sensitivity = tangent_compliance(model, prediction)
+    if load.on_platform:
+        sensitivity = sensitivity @ block_diagonal(prediction.configuration.platform)
+    spread = sensitivity * noise
+    return spread @ spread.T
+
+
+def tangent_compliance(model: ErrorModel, prediction: Prediction) -> Array:
+    """Return the change of the twist with the load, contacts held: C - B A^-1 B', (6, 6)."""
+    geometry = model.table.geometry
+    operators = contact_operators(prediction.configuration, model.parts, geometry.gravity)
+    active = prediction.active
+    force_twist = operators.force_twist[:, active]
+    approach = operators.approach[np.ix_(active, active)]
+    return operators.compliance - force_twist @ np.linalg.solve(approach, force_twist.T)

@@ -15,7 +15,7 @@ it does not change with the motion, so there is no loop.
 A weight that stays the same for `SETTLE_S` becomes the payload, and its correction comes in slowly.
 That is the experiment that tells it from a contact: a weight does not mind a correction, the load
 of a contact changes with it.  Then it is a contact, and no payload.  Which part of the correction
-is applied says `applied_share.py`: less where a contact works against it, and all of it only as far
+is applied says `AppliedShare`: less where a contact works against it, and all of it only as far
 as the model is trusted (`SupervisorSettings.trust`).
 
 For the nodes: `declare_payload(Payload | None)` is what a gripper tells, `forget()` begins anew,
@@ -27,7 +27,6 @@ from __future__ import annotations
 
 from copy import copy
 
-from wrist_stiffness.compensation.applied_share import RAMP_S, apart
 from wrist_stiffness.compensation.belief import (
     CALM,
     CHANGES,
@@ -38,13 +37,17 @@ from wrist_stiffness.compensation.belief import (
     NO_LOAD,
     NO_WEIGHT,
     OPEN,
+    RAMP_S,
     SETTLE_S,
     Belief,
+    State,
+    Supervision,
+    SupervisorSettings,
+    apart,
 )
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.payload import Payload, PayloadEstimate, Reading, Thresholds
 from wrist_stiffness.compensation.scales import Held, Scales
-from wrist_stiffness.compensation.supervision import State, Supervision, SupervisorSettings
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.block import Load
 

@@ -17,11 +17,10 @@ from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement
 from wrist_stiffness.mechanism.components import (
     LINKS,
     PASSIVE_JOINTS,
-    Array,
     ElasticComponents,
     FlangeContact,
 )
-from wrist_stiffness.mechanism.geometry import BushingDimensions, Geometry, PlatformDimensions
+from wrist_stiffness.mechanism.geometry import BushingDimensions, Geometry
 from wrist_stiffness.mechanism.pins import in_series, pin_flexibilities
 from wrist_stiffness.mechanism.vectors import skew
 
@@ -116,11 +115,12 @@ def place_components(
         mass.append(inertia)
         if part.name in PASSIVE_JOINTS and part.solid.flanges:
             contact[part.name] = _flange_contact(part, element, geometry.bushings[part.name])
+    plate = geometry.platform
     return ElasticComponents(
         flexibility=np.array(flexibility),
         weight_motor_side=np.array(motor_side),
         weight_platform_side=np.array(platform_side),
-        platform_weight=_platform_weight(geometry.platform),
+        platform_weight=plate.mass * np.vstack([np.eye(3), skew(plate.centre_of_gravity)]),
         contact=contact,
         mass=np.array(mass),
     )
@@ -140,8 +140,3 @@ def _flange_contact(part: Part, element: Superelement, bushing: BushingDimension
             len(wrench.T) // len(part.solid.flanges),
         ).astype(float),
     )
-
-
-def _platform_weight(platform: PlatformDimensions) -> Array:
-    centre = skew(platform.centre_of_gravity)
-    return platform.mass * np.vstack([np.eye(3), centre])

@@ -74,11 +74,7 @@ def _orthotropic_blocks(mesh: SolidMesh, material: OrthotropicMaterial) -> Array
     count = len(gradient)
     block = np.zeros((count, 30, 30))
     for q in range(volume.shape[1]):
-        # Columns are the axes, as `cylindrical_axes` has them at the nodes.
-        axes = np.zeros((count, 3, 3))
-        cosine, sine = place[:2, :, q] / np.hypot(*place[:2, :, q])
-        axes[:, 0, 0], axes[:, 0, 1], axes[:, 1, 0], axes[:, 1, 1] = cosine, -sine, sine, cosine
-        axes[:, 2, 2] = 1.0
+        axes = _axes_about_z(place[:2, :, q])
         slope = axes.transpose(0, 2, 1) @ gradient[..., q]
         # Strains 11, 22, 33, 23, 13, 12 by motion along each axis of each node.
         strain = np.zeros((count, 6, 3, 10))
@@ -154,12 +150,16 @@ def cylindrical_axes(points: Array) -> sparse.csr_matrix:
     `points` (n, 3): places [m].  Gives (3 n, 3 n) orthogonal: x, y, z components from radial,
     tangential and axial ones.
     """
-    cosine, sine = points[:, :2].T / np.hypot(points[:, 0], points[:, 1])
-    blocks = np.zeros((len(points), 3, 3))
-    blocks[:, 0, 0], blocks[:, 0, 1] = cosine, -sine
-    blocks[:, 1, 0], blocks[:, 1, 1] = sine, cosine
-    blocks[:, 2, 2] = 1.0
-    return block_axes(blocks)
+    return block_axes(_axes_about_z(points[:, :2].T))
+
+
+def _axes_about_z(place: Array) -> Array:
+    """Return the axes along the radius, around and along z as columns (n, 3, 3), at x, y (2, n)."""
+    cosine, sine = place / np.hypot(*place)
+    axes = np.zeros((place.shape[1], 3, 3))
+    axes[:, 0, 0], axes[:, 0, 1], axes[:, 1, 0], axes[:, 1, 1] = cosine, -sine, sine, cosine
+    axes[:, 2, 2] = 1.0
+    return axes
 
 
 def block_axes(blocks: Array) -> sparse.csr_matrix:

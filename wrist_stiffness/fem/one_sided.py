@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.fem.cyclic import factorise_cyclic
 from wrist_stiffness.fem.elasticity import cylindrical_axes, rigid_motion, surface_integrals
+from wrist_stiffness.fem.factor import factorise_cyclic
 from wrist_stiffness.fem.mesh import SolidMesh
 from wrist_stiffness.fem.parts import (
     ElasticBody,

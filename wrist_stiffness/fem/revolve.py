@@ -32,23 +32,11 @@ TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 def revolve(section: OCCGeometry, arcs_per_sector: int) -> SolidMesh:
     """Mesh a half section with triangles and sweep it around the axis.
 
-    Parameters
-    ----------
-    section : OCCGeometry
-        From `solids.bushing_section`: x = radius, y = place along the axis, in millimetres.
-    arcs_per_sector : int
-        Prisms along each sector of the circumference.
-
-    Returns
-    -------
-    SolidMesh
-        In metres, about z.  Surfaces are the section's named edges; a ring of a flange is split
-        into sectors, `inner_0` into `inner_0_0` ... `inner_0_3`.
-
-    Raises
-    ------
-    GeometryError
-        If the section cannot be meshed.
+    `section`: from `solids.bushing_section`: x = radius, y = place along the axis, in millimetres;
+    `arcs_per_sector`: prisms along each sector of the circumference.  Gives `SolidMesh`: in metres,
+    about z.  Surfaces are the section's named edges; a ring of a flange is split into sectors,
+    `inner_0` into `inner_0_0` ... `inner_0_3`.  Raises `GeometryError` if the section cannot be
+    meshed.
     """
     plane = generate_mesh(section)
     corners = plane.Coordinates()[:, :2] / MILLIMETRES

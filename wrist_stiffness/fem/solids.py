@@ -65,8 +65,7 @@ def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGe
 
     `link`: the link's dimensions [m]; `angle`: angle at O between the axes of its bores [rad], in
     (0, pi); `sizes`: element sizes [m], stored in the shape.  Gives `OCCGeometry`: the shape, in
-    millimetres.  Raises `GeometryError` if the bar closes on itself, a bore is wider than the bar
-    or the bores meet.
+    millimetres.  Raises `GeometryError` if the bar closes on itself or the bores meet.
     """
     radius, radial, axial = (
         MILLIMETRES * v for v in (link.arc_radius, link.section_radial, link.section_axial)
@@ -76,12 +75,6 @@ def link_shape(link: LinkDimensions, angle: float, sizes: MeshSettings) -> OCCGe
         raise GeometryError(
             f"link of {math.degrees(angle):.3f} deg with an overhang of "
             f"{math.degrees(past_bore):.3f} deg: need an angle in (0, 180) deg and an open bar"
-        )
-    widest = max(link.motor_bore, link.platform_bore)
-    if widest >= min(link.section_axial, 2.0 * link.overhang):
-        raise GeometryError(
-            f"bore of {widest * 1e3:.3f} mm leaves no wall in a bar "
-            f"{link.section_axial * 1e3:.3f} mm wide with {link.overhang * 1e3:.3f} mm overhang"
         )
     between = angle * (link.arc_radius - link.section_radial / 2.0)
     if between <= (link.motor_bore + link.platform_bore) / 2.0:
@@ -119,8 +112,7 @@ def bushing_section(bushing: BushingDimensions, sizes: MeshSettings, rings: int)
 
     `bushing`: the bushing's dimensions [m]; its `radius` and the size of its gaps do not enter.
     `sizes`: element sizes [m], stored in the shape.  `rings`: rings over the width of a flange.
-    Gives `OCCGeometry`: the plane shape, in millimetres.  Raises `GeometryError` if a flange is not
-    wider than the sleeve.
+    Gives `OCCGeometry`: the plane shape, in millimetres.
     """
     r_pin = MILLIMETRES * bushing.pin_diameter / 2.0
     r_hub = r_pin + MILLIMETRES * bushing.wall
@@ -128,11 +120,6 @@ def bushing_section(bushing: BushingDimensions, sizes: MeshSettings, rings: int)
     half = MILLIMETRES * bushing.length / 2.0
     thickness = MILLIMETRES * bushing.flange_thickness
     has_inner, has_outer = bushing.inner_gap is not None, bushing.outer_gap is not None
-    if (has_inner or has_outer) and r_flange <= r_hub:
-        raise GeometryError(
-            f"flange of {bushing.flange_diameter * 1e3:.3f} mm is not wider than its sleeve "
-            f"of {2e3 * r_hub / MILLIMETRES:.3f} mm"
-        )
     # Corners (r, z), each with the name of the edge that starts there.
     borders = r_hub + (r_flange - r_hub) * (np.arange(rings + 1) / rings) ** 2
     inner = [(r, -half, f"inner_{k}") for k, r in enumerate(borders[1:])][::-1]

@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from wrist_stiffness.fem.cyclic import CyclicFactor, factorise_cyclic
 from wrist_stiffness.fem.elasticity import cylindrical_axes, rigid_motion, surface_integrals
-from wrist_stiffness.fem.factor import Factor, factorise
+from wrist_stiffness.fem.factor import CyclicFactor, Factor, factorise, factorise_cyclic
 from wrist_stiffness.fem.parts import ElasticBody
 from wrist_stiffness.mechanism.components import Array
 
@@ -101,23 +100,11 @@ def frame_stiffness(
 ) -> tuple[Array, Array, Array, Array]:
     """Guyan condensation onto the motor-side and the platform-side rigid frame.
 
-    Parameters
-    ----------
-    loads : (3 n, k) float
-        Nodal forces.
-    slides : bool
-        Whether the wall on the platform side, about z, follows its frame along its normals only.
-
-    Returns
-    -------
-    stiffness : (12, 12) float
-        Of the two frames, motor side first.
-    on_frames : (12, k) float
-        Wrenches on the frames that do the loads' work.
-    inner : (k, k) float
-        Work of each load along each load's displacements with both frames held.
-    shape : (3 n, 12) float
-        Displacements of the nodes by the frames' unit screws.
+    `loads` (3 n, k): nodal forces; `slides`: whether the wall on the platform side, about z,
+    follows its frame along its normals only.  Gives `stiffness` (12, 12): of the two frames, motor
+    side first; `on_frames` (12, k): wrenches on the frames that do the loads' work; `inner` (k, k):
+    work of each load along each load's displacements with both frames held; `shape` (3 n, 12):
+    displacements of the nodes by the frames' unit screws.
     """
     axes = _axes(body)
     rigid = axes.T @ rigid_motion(body.mesh.nodes)

@@ -24,7 +24,7 @@ from wrist_stiffness.fem.solids import MeshSettings
 from wrist_stiffness.fem.superelement import Interface
 from wrist_stiffness.lookup.biharmonic import KERNEL
 from wrist_stiffness.lookup.operators import pack
-from wrist_stiffness.lookup.rated_load import rated_map
+from wrist_stiffness.lookup.response import rated_map
 from wrist_stiffness.lookup.table import Evaluation, Table, TableHeader
 from wrist_stiffness.lookup.verification import interpolation_errors
 from wrist_stiffness.mechanism.components import ELASTIC, ElasticComponents
@@ -67,25 +67,11 @@ def build_table(
 ) -> Table:
     """Run the sweep.
 
-    Parameters
-    ----------
-    progress : callable
-        Called with steps done and in all.
-    condenser : callable
-        `condense_solid`, or a `CondensedStore` for a build that can be resumed.
-
-    Returns
-    -------
-    Table
-        With its stated errors in the header; not yet written.  They may exceed the tolerance
-        where walls that lift off do, or where a finer mesh would need too much memory.
-
-    Raises
-    ------
-    GeometryError
-        If the geometry is wrong.
-    TableError
-        If nodes shall use splines and no grid meets the tolerance.
+    `progress`: called with steps done and in all; `condenser`: `condense_solid`, or a
+    `CondensedStore` for a build that can be resumed.  Gives `Table`: with its stated errors in the
+    header; not yet written.  They may exceed the tolerance where walls that lift off do, or where a
+    finer mesh would need too much memory.  Raises `GeometryError` if the geometry is wrong;
+    `TableError` if nodes shall use splines and no grid meets the tolerance.
     """
     geometry = geometry_from_values(values)
     steps = len(ELASTIC) + 2

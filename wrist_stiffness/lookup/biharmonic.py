@@ -56,12 +56,13 @@ class BiharmonicSpline:
         """Spline through values at nodes.
 
         `nodes` (n, 2): joint angles [rad], at least three nodes that are not on a line, in any
-        order; `values` (n, m): m value columns, any units.  Raises `InputError`: wrong shapes,
-        values that are not finite, too few or duplicate nodes, nodes on a line.
+        order; `values` (n, m): m value columns, any units.  Raises `InputError`: too few or
+        duplicate nodes, nodes on a line.
         """
         nodes = np.array(nodes, dtype=float)
         values = np.array(values, dtype=float)
-        _require_data(nodes, values)
+        if len(nodes) < 3:
+            raise InputError(f"spline nodes: {len(nodes)} given; at least 3 needed")
         offset = nodes.min(axis=0)
         scale = np.ptp(nodes, axis=0)
         _require_spread_nodes(nodes, offset, scale)
@@ -80,12 +81,9 @@ class BiharmonicSpline:
     def __call__(self, theta: ArrayLike) -> NDArray[np.float64]:
         """Evaluate the spline, (..., m): values [unit of the values].
 
-        `theta` (..., 2): joint angles [rad].  Raises `InputError`: the last dimension of theta is
-        not 2.
+        `theta` (..., 2): joint angles [rad].
         """
         theta = np.asarray(theta, dtype=float)
-        if theta.ndim < 1 or theta.shape[-1] != 2:
-            raise InputError(f"joint angles: shape {theta.shape}; (..., 2) expected")
         scaled = (theta.reshape(-1, 2) - self.offset) / self.scale
         count = len(self.nodes)
         result = np.empty((len(scaled), self.coefficients.shape[1]))
@@ -137,22 +135,6 @@ def _system_matrix(scaled: NDArray[np.float64]) -> NDArray[np.float64]:
     matrix[:count, count:] = plane
     matrix[count:, :count] = plane.T
     return matrix
-
-
-def _require_data(nodes: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    if nodes.ndim != 2 or nodes.shape[1] != 2:
-        raise InputError(f"spline nodes: shape {nodes.shape}; (n, 2) expected")
-    if values.ndim != 2 or len(values) != len(nodes):
-        raise InputError(f"spline values: shape {values.shape}; ({len(nodes)}, m) expected")
-    for name, array in (("nodes", nodes), ("values", values)):
-        if not np.isfinite(array).all():
-            row, column = np.argwhere(~np.isfinite(array))[0]
-            raise InputError(
-                f"spline {name}: {array[row, column]} in row {row}, column {column}; "
-                "finite numbers expected"
-            )
-    if len(nodes) < 3:
-        raise InputError(f"spline nodes: {len(nodes)} given; at least 3 needed")
 
 
 def _require_spread_nodes(

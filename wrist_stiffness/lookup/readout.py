@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.vectors import vee
 
 MIN_SPREAD_RATIO = 0.1
 """Smallest usable extent of the points relative to their largest (ratio of singular values)."""
@@ -44,14 +45,7 @@ class PlatformError:
         below 1e-8 rad.
         """
         r = self.rotation
-        twice_sine = np.linalg.norm(
-            [
-                r[..., 2, 1] - r[..., 1, 2],
-                r[..., 0, 2] - r[..., 2, 0],
-                r[..., 1, 0] - r[..., 0, 1],
-            ],
-            axis=0,
-        )
+        twice_sine = np.linalg.norm(vee(r), axis=-1)
         return np.arctan2(twice_sine, np.trace(r, axis1=-2, axis2=-1) - 1.0)
 
 
@@ -63,29 +57,13 @@ def fit_platform_error(points_undeformed: ArrayLike, points_deformed: ArrayLike)
     points centimetres from O, 1e-17 m in s, wherever O lies; only the rounding of the given
     coordinates is added.
 
-    Parameters
-    ----------
-    points_undeformed : (n, 3) or (..., n, 3) array
-        Readout points of the rigid wrist in F [m]: one set for all, or one per pose.
-    points_deformed : (..., n, 3) array
-        The same points under load in F [m].
-
-    Returns
-    -------
-    PlatformError
-        shift (..., 3) [m] and rotation (..., 3, 3).
-
-    Raises
-    ------
-    InputError
-        Fewer than four points, shapes that do not match, values that are not finite, or points
-        near a plane (sigma_min / sigma_max of the centred points below `MIN_SPREAD_RATIO`).
+    `points_undeformed` (n, 3) or (..., n, 3): readout points of the rigid wrist in F [m], one set
+    for all, or one per pose; `points_deformed` (..., n, 3): the same points under load in F [m].
+    Raises `InputError`: fewer than four points, or points near a plane (sigma_min / sigma_max of
+    the centred points below `MIN_SPREAD_RATIO`).
     """
-    undeformed = _as_points(points_undeformed, "undeformed readout points")
-    deformed = _as_points(points_deformed, "deformed readout points")
-    _require_same_points(undeformed, deformed)
-    _require_finite(undeformed, "undeformed readout points")
-    _require_finite(deformed, "deformed readout points")
+    undeformed = np.asarray(points_undeformed, dtype=float)
+    deformed = np.asarray(points_deformed, dtype=float)
     _require_spread(undeformed, 3, "readout points", "they lie near a plane")
 
     displacement = deformed - undeformed
@@ -98,35 +76,15 @@ def fit_platform_error(points_undeformed: ArrayLike, points_deformed: ArrayLike)
 def fit_markers(points_reference: ArrayLike, points_measured: ArrayLike) -> PlatformError:
     """Fit the platform error to measured markers: the rigid motion with the least squared misfit.
 
-    Parameters
-    ----------
-    points_reference : (n, 3) array
-        Nominal marker positions of the rigid wrist in F [m].
-    points_measured : (n, 3) array
-        Measured positions in F [m]; a marker with any NaN coordinate is lost and left out.
-
-    Returns
-    -------
-    PlatformError
-        shift (3,) [m] and rotation (3, 3).
-
-    Raises
-    ------
-    InputError
-        Fewer than three markers seen, markers near a line (second singular value of the centred
-        points below `MIN_SPREAD_RATIO` of the first), shapes that do not match, infinite values.
+    `points_reference` (n, 3): nominal marker positions of the rigid wrist in F [m];
+    `points_measured` (n, 3): measured positions in F [m]; a marker with any NaN coordinate is lost
+    and left out.  Raises `InputError`: fewer than three markers seen, or markers near a line
+    (second singular value of the centred points below `MIN_SPREAD_RATIO` of the first).
     """
-    reference = _as_points(points_reference, "reference markers")
-    measured = _as_points(points_measured, "measured markers")
-    if reference.ndim != 2 or measured.ndim != 2:
-        raise InputError(
-            f"markers: shapes {reference.shape} and {measured.shape}; one set (n, 3) each expected"
-        )
-    _require_same_points(reference, measured)
-    _require_finite(reference, "reference markers")
+    reference = np.asarray(points_reference, dtype=float)
+    measured = np.asarray(points_measured, dtype=float)
     seen = ~np.isnan(measured).any(axis=-1)
     reference, measured = reference[seen], measured[seen]
-    _require_finite(measured, "measured markers")
     _require_spread(reference, 2, "reference markers", "they lie near a line")
     _require_spread(measured, 2, "measured markers", "they lie near a line")
 
@@ -145,32 +103,6 @@ def _nearest_rotation(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     # A reflection is no platform motion: turn the direction of the smallest singular value.
     u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
     return u @ vt
-
-
-def _as_points(points: ArrayLike, what: str) -> NDArray[np.float64]:
-    array = np.asarray(points, dtype=float)
-    if array.ndim < 2 or array.shape[-1] != 3:
-        raise InputError(f"{what}: shape {array.shape}; (..., n, 3) expected")
-    return array
-
-
-def _require_same_points(before: NDArray[np.float64], after: NDArray[np.float64]) -> None:
-    try:
-        np.broadcast_shapes(before.shape[:-2], after.shape[:-2])
-    except ValueError as error:
-        raise InputError(
-            f"points before {before.shape} and after {after.shape}: numbers of poses do not match"
-        ) from error
-    if before.shape[-2] != after.shape[-2]:
-        raise InputError(
-            f"{before.shape[-2]} points before and {after.shape[-2]} after: the same expected"
-        )
-
-
-def _require_finite(points: NDArray[np.float64], what: str) -> None:
-    if not np.isfinite(points).all():
-        place = tuple(int(i) for i in np.argwhere(~np.isfinite(points))[0])
-        raise InputError(f"{what}: {points[place]} at index {place}; finite metres expected")
 
 
 def _require_spread(points: NDArray[np.float64], dimensions: int, what: str, fault: str) -> None:

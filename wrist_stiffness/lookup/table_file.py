@@ -57,14 +57,14 @@ def save_table(table: Table, path: str | Path) -> Table:
     """
     path = Path(path)
     arrays = _to_arrays(table)
-    checksum = _checksum(_header_values(table.header), arrays)
+    checksum = _checksum(asdict(table.header), arrays)
     header = {
         "magic": MAGIC,
         "schema": SCHEMA,
         "units": UNITS,
         "geometry_sha256": table.geometry.sha256,
         "checksum": checksum,
-        **_header_values(table.header),
+        **asdict(table.header),
         "spline": {
             "kernel": KERNEL,
             "trend": TREND,
@@ -174,10 +174,6 @@ def _check(table: Table, path: str | Path) -> None:
         raise TableError(
             f"{path}: evaluation {table.header.evaluation!r} is not one of {EVALUATIONS}"
         )
-
-
-def _header_values(header: TableHeader) -> dict[str, Any]:
-    return asdict(header)
 
 
 def _to_arrays(table: Table) -> dict[str, Array]:

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.lookup.rated_load import rated_map
-from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.lookup.response import rated_map, respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Limits

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.mechanism.components import CARRIER, ENDS, LINKS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
-from wrist_stiffness.mechanism.vectors import triad
+from wrist_stiffness.mechanism.vectors import frame_about
 
 BOSS = "boss of joint_4"
 """What of link_3 holds joint_4's bushing where this reaches past the bar."""
@@ -142,8 +142,7 @@ def _plate(geometry: Geometry) -> _Body:
 
 
 def _round(carrier: str, axis: Array, radius: float, low: float, high: float) -> _Body:
-    least = np.eye(3)[np.argmin(np.abs(axis))]
-    axes = np.roll(triad(axis, least), -1, axis=1)
+    axes = np.roll(frame_about(axis), -1, axis=1)
     return _Body(
         carrier, axes, np.array([-1e-12, -math.pi, low]), np.array([radius, math.pi, high])
     )

@@ -15,10 +15,95 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.compiled_constants import parts_constants
-from wrist_stiffness.mechanism.components import Array, ElasticComponents
-from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.contact import NOT_DEFINITE
+from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
+from wrist_stiffness.mechanism.geometry import Limits
+from wrist_stiffness.mechanism.influence import LIMB_1, LIMB_2
+from wrist_stiffness.mechanism.kinematics import GRAM_ROUNDING, Mechanism
+from wrist_stiffness.mechanism.vectors import skew
+
+GROUPS = tuple(
+    tuple(name for name in limb if CARRIER[name] == body)
+    for limb, body in (
+        (LIMB_1, "frame"),
+        (LIMB_1, "link_1"),
+        (LIMB_2, "frame"),
+        (LIMB_2, "link_2"),
+        (LIMB_2, "link_3"),
+    )
+)
+"""Elastic components that lie in one limb and turn with one body."""
+
+
+def mechanism_constants(
+    mechanism: Mechanism, rectangle: tuple[Array, Array], limits: Limits
+) -> Array:
+    """Return what `native` must know of a kinematic scheme and its domain."""
+    turn = np.zeros((24, 5))
+    driven = np.stack([mechanism.b0, mechanism.d0])
+    axes = np.stack([mechanism.a1, mechanism.a2])
+    for i in range(2):
+        along = np.outer(axes[i], axes[i])
+        parts = np.stack([along, np.eye(3) - along, skew(axes[i])], axis=-1)
+        columns = [0, 1 + 2 * i, 2 + 2 * i]
+        turn[9 * i : 9 * i + 9, columns] = np.swapaxes(parts, 0, 1).reshape(9, 3)
+        turn[18 + 3 * i : 21 + 3 * i, columns] = np.swapaxes(parts, 1, 2) @ driven[i]
+    homes = [np.stack([each, mechanism.c0, np.cross(each, mechanism.c0)]) for each in driven]
+    return np.concatenate(
+        [
+            turn.ravel(),
+            np.linalg.inv(homes).ravel(),
+            axes.ravel(),
+            [mechanism.b0 @ mechanism.c0, mechanism.c0 @ mechanism.d0],
+            [mechanism.assembly_mode, GRAM_ROUNDING],
+            np.transpose(rectangle).ravel(),
+            [limits.singularity, *limits.most_load],
+        ]
+    )
+
+
+def parts_constants(
+    components: ElasticComponents,
+    gravity: Array,
+    screws: Array | None,
+    opening: Array | None,
+    load_scale: float,
+    load_added: Array | None,
+) -> Array:
+    """Return what `native` must know of the elastic parts and of what is constant."""
+    sectors = components.sectors
+    m, bodies = len(sectors.gap), len(BODIES)
+    flexibility, weight_screw = np.zeros((len(GROUPS), 6, 6)), np.zeros((len(GROUPS), 6, 3))
+    group_of, weight_gap = np.zeros((m, 1)), np.zeros((m, 3))
+    weight = np.zeros((bodies, 6, 3))
+    for group, names in enumerate(GROUPS):
+        carried = np.zeros((6, 3))
+        for name in reversed(names):
+            k = ELASTIC.index(name)
+            own = sectors.component == k
+            here = carried + components.weight_platform_side[k]
+            flexibility[group] += components.flexibility[k]
+            weight_screw[group] += components.flexibility[k] @ here
+            group_of[own] = group
+            weight_gap[own] = sectors.weight_approach[own] + sectors.screw[own] @ here
+            carried = here + components.weight_motor_side[k]
+        weight[BODIES.index(CARRIER[names[0]])] = carried
+    weight[BODIES.index("platform")] = components.platform_weight
+    gap = sectors.gap if opening is None else sectors.gap + opening
+    rows = [group_of, sectors.slide, sectors.screw, weight_gap, gap[:, None]]
+    return np.concatenate(
+        [
+            gravity,
+            [load_scale],
+            np.zeros(6) if load_added is None else load_added,
+            flexibility.ravel(),
+            weight_screw.ravel(),
+            np.zeros(6 * len(GROUPS)) if screws is None else screws.ravel(),
+            weight.ravel(),
+            np.hstack(rows).ravel(),
+            sectors.approach.ravel(),
+        ]
+    )
 
 
 def _native() -> Any:
@@ -32,6 +117,8 @@ native: Any = _native()
 """The compiled functions; None where the package was installed without a C compiler."""
 
 Flags = NDArray[np.bool_]
+
+NOT_DEFINITE = "contact: the flexibility of the flanges is singular or not positive definite"
 
 
 class PredictedRows(NamedTuple):
@@ -176,30 +263,12 @@ class CompiledWrist:
     ) -> tuple[Array, Array, Flags]:
         """Solve for the platform's twist under a load, with contact and own weight.
 
-        Parameters
-        ----------
-        wrench : (6,) float
-            Load on the platform at O in F, as it acts [N, N m].
-        active : (m,) bool, optional
-            First guess of the sectors in contact; leaves no trace in the result.
-        limb_1, limb_2 : (6,) float, optional
-            Further screws in the limbs at O in F [m, rad].
-        opening : (m,) float, optional
-            Further opening of the sectors [m].
-
-        Returns
-        -------
-        twist : (6,) float
-            Of the platform at O in F, first order [m, rad].
-        force : (m,) float
-            Of each sector [N].
-        active : (m,) bool
-            Sectors in contact.
-
-        Raises
-        ------
-        InputError
-            If the flanges' flexibility is not positive definite.
+        `wrench` (6,): load on the platform at O in F, as it acts [N, N m].  `active` (m,): first
+        guess of the sectors in contact; leaves no trace in the result.  `limb_1`, `limb_2` (6,):
+        further screws in the limbs at O in F [m, rad].  `opening` (m,): further opening of the
+        sectors [m].  Gives `twist` (6,): of the platform at O in F, first order [m, rad], `force`
+        (m,): of each sector [N], and `active` (m,): sectors in contact.  Raises `InputError` if the
+        flanges' flexibility is not positive definite.
         """
         twist, force = np.empty(6), np.empty(self.sectors)
         closed = np.zeros(self.sectors, dtype=bool) if active is None else active.copy()
@@ -258,24 +327,11 @@ class CompiledWrist:
     ) -> int:
         """Correct commands in their order (see `compensation.correction.correct` and `safety`).
 
-        Parameters
-        ----------
-        task : (11,) float, optional
-            What to make right and how far (see `compensation.corrector`); None where `found` was
-            searched before.
-        safety : (8,) float, optional
-            From `SafetySettings.compiled`; None where nothing is to be applied yet.
-        commands : CompiledCommands
-            n of them.
-        state : CorrectorState
-            Of the command before; afterwards that of the last command done.
-        supervisor : CompiledSupervisor, optional
-            Writes the loads to correct for over the measured ones, and the shares.
-
-        Returns
-        -------
-        int
-            Which command comes next: the first that cannot be done here, else the end.
+        `task` (11,): what to make right and how far (see `compensation.corrector`); None where
+        `found` was searched before.  `safety` (8,): from `SafetySettings.compiled`; None where
+        nothing is to be applied yet.  `state`: of the command before; afterwards that of the last
+        command done.  `supervisor`: writes the loads to correct for over the measured ones, and the
+        shares.  Gives which command comes next: the first that cannot be done here, else the end.
         """
         done: int = native.correct(
             self._mechanism,

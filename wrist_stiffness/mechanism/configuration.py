@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import vee
 
 BODIES = ("frame", "link_1", "link_2", "platform", "link_3")
 """Rigid bodies, in the order of `Configuration.bodies`."""
 
-
-TURNING = {"joint_2": ("link_1", "platform"), "joint_3": ("link_3", "platform")}
-TURNING["joint_4"] = ("link_2", "link_3")
+TURNING = {
+    "joint_2": ("link_1", "platform"),
+    "joint_3": ("link_3", "platform"),
+    "joint_4": ("link_2", "link_3"),
+}
 """Body on the motor side and on the platform side of each passive joint."""
 
 
@@ -49,7 +52,7 @@ class Configuration:
     def __getattr__(self, name: str) -> Array:
         """Return a field of `of_row`, or the row of the fields."""
         if name == "row":
-            value = np.concatenate([np.ravel(each) for each in self._values()])
+            value = np.concatenate([np.ravel(getattr(self, each.name)) for each in fields(self)])
         elif name in _PLACES and "row" in vars(self):
             begin, end, shape = _PLACES[name]
             value = self.row[..., begin:end].reshape((*self.row.shape[:-1], *shape))
@@ -62,9 +65,6 @@ class Configuration:
     def as_block(self) -> Configuration:
         """One pose as a stack of one."""
         return Configuration.of_row(self.row[None])
-
-    def _values(self) -> list[Array]:
-        return [getattr(self, field.name) for field in fields(self)]
 
     @property
     def rotations(self) -> dict[str, Array]:
@@ -83,15 +83,8 @@ class Configuration:
         """
         before, after = (self.rotations[body] for body in TURNING[joint])
         relative = np.swapaxes(before, -1, -2) @ after
-        vee = np.stack(
-            [
-                relative[..., 2, 1] - relative[..., 1, 2],
-                relative[..., 0, 2] - relative[..., 2, 0],
-                relative[..., 1, 0] - relative[..., 0, 1],
-            ],
-            axis=-1,
-        )
-        return np.asarray(np.arctan2(vee @ axis, np.trace(relative, axis1=-2, axis2=-1) - 1.0))
+        about = vee(relative) @ axis
+        return np.asarray(np.arctan2(about, np.trace(relative, axis1=-2, axis2=-1) - 1.0))
 
 
 _SHAPES: dict[str, tuple[int, ...]] = {

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.compiled import NOT_DEFINITE, Flags, native
 from wrist_stiffness.mechanism.components import Array
 
 RELATIVE_TOLERANCE = 1e-12
@@ -25,39 +26,17 @@ PATIENCE = 5
 
 MAX_PIVOTS = 5000
 
-NOT_DEFINITE = "contact: the flexibility of the flanges is singular or not positive definite"
-
 
 def solve_contact(
     approach: Array, gap: Array, active: NDArray[np.bool_] | None = None
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Solve the contact problem of one pose.
 
-    Parameters
-    ----------
-    approach : (m, m) float
-        A [m/N].
-    gap : (m,) float
-        Opening without contact forces; negative where the surfaces would overlap [m].
-    active : (m,) bool, optional
-        First guess of the sectors in contact, usually those of the sample before.
-
-    Returns
-    -------
-    force : (m,) float
-        Contact forces, not negative [N].
-    active : (m,) bool
-        Sectors in contact.
-
-    Raises
-    ------
-    InputError
-        If shapes do not fit, an input is not finite or the matrix is not positive definite.
+    `approach` (m, m): A [m/N].  `gap` (m,): opening without contact forces; negative where the
+    surfaces would overlap [m].  `active` (m,): first guess of the sectors in contact, usually those
+    of the sample before.  Gives `force` (m,): not negative [N], and `active` (m,): sectors in
+    contact.  Raises `InputError` if an input is not finite or the matrix is not positive definite.
     """
-    m = len(gap)
-    if approach.shape != (m, m) or (active is not None and active.shape != (m,)):
-        guess = "" if active is None else f" and a guess of shape {active.shape}"
-        raise InputError(f"contact: {m} gaps, but a flexibility of shape {approach.shape}{guess}")
     if not (np.all(np.isfinite(gap)) and np.all(np.isfinite(approach))):
         raise InputError("contact: a gap or a flexibility is not finite")
     return settle(approach, gap, active)
@@ -120,3 +99,60 @@ def _places(closed: bytes) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return where held sectors stand in a vector and in a raveled square matrix."""
     places = np.flatnonzero(np.frombuffer(closed, dtype=bool))
     return places, len(closed) * places[:, None] + places
+
+
+def solve_contacts(
+    approach: Array, gap: Array, guess: NDArray[np.bool_] | None = None
+) -> tuple[Array, Flags]:
+    """Solve t contact problems of each of n samples.
+
+    `approach` (n, m, m): A of each sample [m/N].  `gap` (n, m) or (n, t, m): openings without
+    contact forces [m].  `guess`: sectors in contact to begin with, as `gap` or spread to its shape;
+    leaves no trace in the result.  Gives `force`: not negative [N].  Raises `InputError` if an
+    input is not finite or a matrix is not positive definite.
+    """
+    n, m = len(approach), approach.shape[-1]
+    active = np.zeros(gap.shape, dtype=bool)
+    if not gap.size:
+        return np.zeros(gap.shape), active
+    if guess is not None:
+        active[...] = guess
+    flat = np.ascontiguousarray(gap, float).reshape(-1, m)
+    each = len(flat) // n
+    state, force = active.reshape(-1, m), np.empty(flat.shape)
+    done = 0
+    if _served(m):
+        matrices = np.ascontiguousarray(approach, float)
+        done = native.settle(matrices, flat, state, force, n, each, m)
+    for place in range(done, len(flat)):
+        given = None if guess is None else state[place]
+        force[place], state[place] = solve_contact(approach[place // each], flat[place], given)
+    return force.reshape(gap.shape), active
+
+
+def forces_of(approach: Array, gap: Array, closed: Flags) -> Array:
+    """Return the forces that close the given sectors, of either sign: the tangent of contact.
+
+    `approach` (n, m, m): A [m/N]; `gap` (n, m) or (n, t, m): openings without contact forces [m];
+    `closed` (n, m): sectors held closed.  Gives forces, linear in it; zero where not held [N].
+    Raises `InputError` if a matrix is not positive definite.
+    """
+    n, m = closed.shape
+    if not gap.size:
+        return np.zeros(gap.shape)
+    columns = np.ascontiguousarray(gap, float).reshape(n, -1, m)
+    force = np.zeros(columns.shape)
+    if _served(m):
+        own = np.ascontiguousarray(approach, float), columns, np.ascontiguousarray(closed), force
+        if native.hold(*own, n, columns.shape[1], m) < n:
+            raise InputError(NOT_DEFINITE)
+        return force.reshape(gap.shape)
+    for row in range(n):
+        for column, own_gap in enumerate(columns[row]):
+            force[row, column] = held_force(approach[row], own_gap, closed[row])
+    return force.reshape(gap.shape)
+
+
+def _served(sectors: int) -> bool:
+    """Tell whether the compiled formulas serve so many sectors."""
+    return native is not None and sectors <= native.MOST_SECTORS

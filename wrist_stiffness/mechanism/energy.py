@@ -42,7 +42,14 @@ def component_screws(
     through = component_wrenches(influence(configuration), components, wrench, force)
     flexibility = turned_flexibilities(configuration, components)
     bent = (flexibility @ through[..., None])[..., 0]
-    return bent + _pressed(_flange_screws(configuration, components, force), components)
+    return bent + flange_screws(configuration, components, force)
+
+
+def flange_screws(
+    configuration: Configuration, components: ElasticComponents, force: Array
+) -> Array:
+    """Return what pressed flanges (..., m) [N] add to the screws of their bushings, (..., 8, 6)."""
+    return _pressed(_sector_screws(configuration, components, force), components)
 
 
 def strain_energies(
@@ -60,13 +67,13 @@ def strain_energies(
     flexibility = turned_flexibilities(configuration, components)
     energy: Array = 0.5 * np.einsum("...ki,...kij,...kj->...k", through, flexibility, through)
     sectors = components.sectors
-    bent = _flange_screws(configuration, components, force)
+    bent = _sector_screws(configuration, components, force)
     own = np.einsum("...mi,...mi->...m", through.take(sectors.component, axis=-2), bent)
     own += 0.5 * force * (force @ sectors.approach)
     return energy + _pressed(own[..., None], components)[..., 0]
 
 
-def _flange_screws(
+def _sector_screws(
     configuration: Configuration, components: ElasticComponents, force: Array
 ) -> Array:
     """Screw of the bushing by each sector's contact force, (..., m, 6)."""

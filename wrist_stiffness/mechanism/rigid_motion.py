@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.compiled import native
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.vectors import cross, dot, skew
+from wrist_stiffness.mechanism.vectors import cross, dot, skew, vee
 
 SMALL_ANGLE = 1e-4
 """Below this the series of the coefficients is exact to double precision."""
@@ -55,10 +55,7 @@ def rotation_vector(rotation: Array) -> Array:
     For small angles to the last digit, and of many in a tenth of SciPy's time.
     """
     # Twice the sine of the angle times the axis.
-    w = np.empty(rotation.shape[:-1])
-    w[..., 0] = rotation[..., 2, 1] - rotation[..., 1, 2]
-    w[..., 1] = rotation[..., 0, 2] - rotation[..., 2, 0]
-    w[..., 2] = rotation[..., 1, 0] - rotation[..., 0, 1]
+    w = vee(rotation)
     sine = 0.5 * np.sqrt(dot(w, w))
     cosine = 0.5 * (np.trace(rotation, axis1=-2, axis2=-1) - 1.0)
     turned = sine > 0.0

@@ -56,40 +56,17 @@ def compliance(configuration: Configuration, components: ElasticComponents) -> A
     return component_shares(configuration, components).sum(axis=-3)
 
 
-@dataclass(frozen=True)
-class WeightResponse:
-    """What the own weight of all parts does at a pose, with free slides."""
-
-    # (..., 8, 6), wrench at O in F that bends each component: what its platform side carries, its
-    # own condensed weight there included [N, N m]
-    wrench: Array
-    screw: Array  # (..., 8, 6), elastic screw of each component [m, rad]
-    twist: Array  # (..., 6), twist of the platform [m, rad]
-
-
-def weight_response(
-    configuration: Configuration, components: ElasticComponents, gravity: Array
-) -> WeightResponse:
-    """Return the response to the parts' own weight.
-
-    `configuration`: of shape (...); `gravity` (3,): acceleration of gravity in F [m/s^2].  Gives
-    `WeightResponse`: wrenches through the components, their screws and the platform's twist.
-    """
-    projectors = influence(configuration)
-    wrench = weight_wrench(configuration, components, gravity, projectors)
-    screw = (turned_flexibilities(configuration, components) @ wrench[..., None])[..., 0]
-    return WeightResponse(wrench, screw, platform_twist(projectors, screw))
-
-
 def weight_wrench(
     configuration: Configuration,
     components: ElasticComponents,
     gravity: Array,
     projectors: Influence,
 ) -> Array:
-    """Return the wrench of own weight through the elastic components, (..., 8, 6) [N, N m].
+    """Return the wrench of own weight that bends each elastic component, with free slides.
 
-    `configuration`: of shape (...); `gravity` (3,): acceleration of gravity in F [m/s^2].
+    `configuration`: of shape (...); `gravity` (3,): acceleration of gravity in F [m/s^2].  Gives
+    (..., 8, 6): what its platform side carries, its own condensed weight there included, at O in F
+    [N, N m].
     """
     r = component_rotations(configuration)
     field = _to_body(r, gravity)
@@ -194,9 +171,7 @@ def assembled_operators(
     (..., 8, 6): of own weight through the components [N, N m].
     """
     sums = _summed(configuration, projectors, components, flexibility, gravity, wrench)
-    return ContactOperators(
-        **vars(sums), slide=components.sectors.slide, slides=projectors.slides()
-    )
+    return ContactOperators(**sums, slide=components.sectors.slide, slides=projectors.slides())
 
 
 def changed_operators(
@@ -235,19 +210,8 @@ def changed_operators(
     turned = turn @ flexibility[which] @ np.swapaxes(turn, -1, -2)
     projectors = influence(configuration)
     sums = _summed(configuration, projectors, change, turned, gravity, wrench, which)
-    added = {name: getattr(operators, name) + value for name, value in vars(sums).items()}
+    added = {name: getattr(operators, name) + value for name, value in sums.items()}
     return replace(operators, **added)
-
-
-@dataclass(frozen=True)
-class _Sums:
-    """What of `ContactOperators` is a sum over the elastic components."""
-
-    compliance: Array
-    force_twist: Array
-    approach: Array
-    gap: Array
-    weight_twist: Array
 
 
 def _summed(
@@ -258,10 +222,11 @@ def _summed(
     gravity: Array,
     wrench: Array,
     which: NDArray[np.intp] | None = None,
-) -> _Sums:
-    """Sum over the components, or over some by their numbers: then all others count as rigid.
+) -> dict[str, Array]:
+    """Return what of `ContactOperators` is a sum over the components, by its name.
 
-    The flexibility (..., c, 6, 6) is of these, turned to the pose.
+    Or over some of them by their numbers: then all others count as rigid.  The flexibility
+    (..., c, 6, 6) is of these, turned to the pose.
     """
     sectors = components.sectors
     part: slice | NDArray[np.intp] = slice(None)
@@ -306,10 +271,10 @@ def _summed(
     field = _to_body(r, gravity).take(own, axis=-3)
     gap[..., mine] += (sectors.weight_approach[mine, None, :] @ field)[..., 0, 0]
     gap[..., mine] += (screw * through.take(own, axis=-2)).sum(axis=-1)
-    return _Sums(
-        compliance=carry @ below(flexibility @ np.swapaxes(block_diagonal(g), -1, -2)),
-        force_twist=force_twist,
-        approach=approach,
-        gap=gap,
-        weight_twist=(carry @ below(sagged))[..., 0],
-    )
+    return {
+        "compliance": carry @ below(flexibility @ np.swapaxes(block_diagonal(g), -1, -2)),
+        "force_twist": force_twist,
+        "approach": approach,
+        "gap": gap,
+        "weight_twist": (carry @ below(sagged))[..., 0],
+    }

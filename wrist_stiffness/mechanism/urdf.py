@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from wrist_stiffness.mechanism.components import LINKS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.vectors import triad
+from wrist_stiffness.mechanism.vectors import frame_about, triad
 from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 
 FRAMES = {
@@ -50,9 +50,7 @@ def urdf(geometry: Geometry, motors: tuple[str, str]) -> str:
             _draw_arc(link, geometry, body)
         elif body == "platform":
             plate = geometry.platform
-            across = np.eye(3)[np.argmin(np.abs(plate.normal))]
-            upright = np.roll(triad(plate.normal, across), -1, axis=1)
-            _cylinder(link, plate.centre, upright, 0.5 * plate.diameter, plate.thickness)
+            _cylinder(link, plate.centre, plate.normal, 0.5 * plate.diameter, plate.thickness)
     names = dict(zip(("motor_1", "motor_2"), motors, strict=True))
     for joint, parent, child, axis in TREE:
         kind = "revolute" if joint in names else "continuous"
@@ -79,16 +77,16 @@ def _draw_arc(element: ElementTree.Element, geometry: Geometry, link: str) -> No
     for first, second in zip(points[:-1], points[1:], strict=True):
         along = second - first
         length = float(np.linalg.norm(along))
-        across = np.eye(3)[np.argmin(np.abs(along))]
-        upright = np.roll(triad(along / length, across), -1, axis=1)
         radius = 0.5 * dimensions.section_radial
-        _cylinder(element, 0.5 * (first + second), upright, radius, length)
+        _cylinder(element, 0.5 * (first + second), along / length, radius, length)
 
 
 def _cylinder(
-    element: ElementTree.Element, centre: Array, upright: Array, radius: float, length: float
+    element: ElementTree.Element, centre: Array, axis: Array, radius: float, length: float
 ) -> None:
     visual = ElementTree.SubElement(element, "visual")
+    # It stands along its own z.
+    upright = np.roll(frame_about(axis), -1, axis=1)
     turn = Rotation.from_matrix(upright).as_euler("xyz")
     ElementTree.SubElement(visual, "origin", xyz=_text(centre), rpy=_text(turn))
     shape = ElementTree.SubElement(visual, "geometry")

@@ -33,6 +33,15 @@ def skew(u: Array) -> Array:
     return out
 
 
+def vee(matrix: Array) -> Array:
+    """Return the (..., 3) vector of a (..., 3, 3) matrix less its transpose, which is its u x."""
+    out = np.empty(matrix.shape[:-1])
+    out[..., 0] = matrix[..., 2, 1] - matrix[..., 1, 2]
+    out[..., 1] = matrix[..., 0, 2] - matrix[..., 2, 0]
+    out[..., 2] = matrix[..., 1, 0] - matrix[..., 0, 1]
+    return out
+
+
 def triad(u: Array, v: Array) -> Array:
     """Return the (..., 3, 3) frame of columns u, unit u x v and their cross product."""
     out = np.empty((*np.broadcast_shapes(u.shape, v.shape), 3))
@@ -41,6 +50,11 @@ def triad(u: Array, v: Array) -> Array:
     out[..., 1] = w
     out[..., 2] = cross(u, w)
     return out
+
+
+def frame_about(axis: Array) -> Array:
+    """Return a (3, 3) frame whose first column is a unit vector (3,), the others across it."""
+    return triad(axis, np.eye(3)[np.argmin(np.abs(axis))])
 
 
 def angle_between(u: Array, v: Array) -> Array:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import SingularPoseError, UnreachablePoseError
-from wrist_stiffness.mechanism.compiled import native
-from wrist_stiffness.mechanism.compiled_constants import mechanism_constants
+from wrist_stiffness.mechanism.compiled import mechanism_constants, native
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits

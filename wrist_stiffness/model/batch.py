@@ -76,23 +76,13 @@ def predicted(
 ) -> list[BlockPrediction]:
     """Predict a recording with models that share their table.
 
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-        What they have in common with the first one is computed once.
-    block : Block
-        n samples.
-    accepted : (n,) bool
-        Samples inside the table's domain and load range; the effects' memory passes over the rest.
-    near : sequence of dict, optional
-        `guesses` of an earlier prediction of this block.
-    recent : Recent, optional
-        Of this block; then `models` begin with what it says is like the first.
+    What they have in common with the first one is computed once.
 
-    Raises
-    ------
-    InputError
-        If a user's formula has no finite value; the message says how long after the first sample.
+    `block`: n samples; `accepted` (n,): those inside the table's domain and load range; the
+    effects' memory passes over the rest; `near`: `guesses` of an earlier prediction of this block;
+    `recent`: of this block; then `models` begin with what it says is like the first.  Raises
+    `InputError` if a user's formula has no finite value; the message says how long after the first
+    sample.
     """
     try:
         return _predicted(models, block, accepted, near, recent or Recent())

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
-from wrist_stiffness.mechanism.contacts import forces_of
+from wrist_stiffness.mechanism.contact import forces_of
 from wrist_stiffness.mechanism.energy import component_wrenches
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.block import Sample

@@ -24,7 +24,7 @@ from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.model.batch import Recent, predicted
 from wrist_stiffness.model.block import Block, Load, Sample
-from wrist_stiffness.model.constants import Constants
+from wrist_stiffness.model.contribution import Constants
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
@@ -217,10 +217,10 @@ class ErrorModel:
         configuration = self.table.workspace.configuration(theta)
         self.table.check_load(load.wrench)
         found = evaluate(self, Sample(0.0, theta, load).block, None)
-        return self._prediction(load, found.twist[0], configuration, found.active[0])
+        return self.prediction_of(found.twist[0], configuration.row, found.active[0], load)
 
     def prediction_of(self, twist: Array, row: Array, active: Flags, load: Load) -> Prediction:
-        """Return a compiled prediction.
+        """Return the prediction that these numbers belong to.
 
         Parameters
         ----------
@@ -233,11 +233,7 @@ class ErrorModel:
         load : Load
             On the platform.
         """
-        return self._prediction(load, twist, Configuration.of_row(row), active)
-
-    def _prediction(
-        self, load: Load, twist: Array, configuration: Configuration, active: Flags
-    ) -> Prediction:
+        configuration = Configuration.of_row(row)
         of_parameters = None
         if not self.certain:
 

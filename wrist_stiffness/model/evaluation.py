@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.contacts import solve_contacts
+from wrist_stiffness.mechanism.contact import solve_contacts
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.contribution import NOTHING, Contribution

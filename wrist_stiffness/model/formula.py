@@ -14,6 +14,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.memory import play
 
 NO_UNITS: Mapping[str, float] = MappingProxyType({})
 
@@ -48,33 +49,27 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Value]]] = {
 """Number of arguments and meaning of each function."""
 
 
-def _lag(x: list[float], tau: float, time: list[float], state: State) -> tuple[list[float], State]:
+def _lag(x: Array, tau: float, time: Array, state: State | None) -> tuple[Array, State]:
     """Follow x late, with a time constant; exact where x is straight between the samples."""
-    before, last, now = state or (time[0], x[0], x[0])
+    before, last, now = state or (float(time[0]), float(x[0]), float(x[0]))
     found = []
-    for t, value in zip(time, x, strict=True):
+    for t, value in zip(time.tolist(), x.tolist(), strict=True):
         if (step := t - before) > 0.0:
             late = (value - last) / step * tau
             now = value - late + (now - last + late) * math.exp(-step / tau)
         before, last = t, value
         found.append(now)
-    return found, (before, last, now)
+    return np.array(found), (before, last, now)
 
 
-def _play(
-    x: list[float], slack: float, time: list[float], state: State
-) -> tuple[list[float], State]:
+def _play(x: Array, slack: float, time: Array, state: State | None) -> tuple[Array, State]:
     """Follow x as something that x pushes with play to both sides."""
-    (now,) = state or (x[0],)
-    found = []
-    for value in x:
-        now = min(max(now, value - slack), value + slack)
-        found.append(now)
-    return found, (now,)
+    found = play(x, slack, np.asarray(state[0] if state else x[0]))
+    return found, (float(found[-1]),)
 
 
-State = tuple[float, ...] | None
-Remembering = Callable[[list[float], float, list[float], State], tuple[list[float], State]]
+State = tuple[float, ...]
+Remembering = Callable[[Array, float, Array, State | None], tuple[Array, State]]
 
 MEMORIES: dict[str, Remembering] = {"lag": _lag, "play": _play}
 """Functions of a signal and a positive number that remember what was before: `lag(x, seconds)`, a
@@ -87,7 +82,7 @@ class Past:
 
     time: Array  # (n,), stamps [s]
     # of each remembering function by its column in the formula; empty before the first sample
-    states: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    states: dict[int, State] = field(default_factory=dict)
 
     def follow(self, node: ast.Call, name: str, values: Sequence[Value]) -> Value:
         """Return what a remembering function makes of its arguments."""
@@ -96,12 +91,8 @@ class Past:
         if size.ndim or not size > 0.0 or not np.isfinite(x).all():
             return np.full(x.shape, np.nan)
         at = node.col_offset
-        found, state = MEMORIES[name](
-            x.tolist(), float(size), self.time.tolist(), self.states.get(at)
-        )
-        if state is not None:
-            self.states[at] = state
-        return np.array(found)
+        found, self.states[at] = MEMORIES[name](x, float(size), self.time, self.states.get(at))
+        return found
 
 
 COUNTS = {**{name: count for name, (count, _) in FUNCTIONS.items()}, **dict.fromkeys(MEMORIES, 2)}

@@ -95,26 +95,20 @@ class FormulaLaw(Law):
         self.sentence = f"{{place}}: {expression}"
         self.direction = direction
         self.covariates = tuple(covariates)
-        self._keys = tuple(keys)
-        for own in (*self.covariates, *self._keys):
+        # Their first value is 1: a formula may divide by them.
+        self.own = tuple(
+            Parameter(key, -np.inf, np.inf, np.inf, mean=1.0, linear=False) for key in keys
+        )
+        for own in (*self.covariates, *keys):
             if not own.isidentifier():
                 raise InputError(f"{name}: {own!r} is not a name")
             if own in SIGNALS or own in COUNTS or (*covariates, *keys).count(own) > 1:
                 raise InputError(f"{name}: the name {own} is in use")
-        self.formula = Formula(expression, (*sorted(SIGNALS), *self.covariates, *self._keys))
+        self.formula = Formula(expression, (*sorted(SIGNALS), *self.covariates, *keys))
         self.signals = tuple(
             used
             for used in sorted(self.formula.names)
             if used in self.covariates or used.startswith(TEMPERATURE)
-        )
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the formula's own parameters, without bounds.
-
-        Their first value is 1: a formula may divide by them.
-        """
-        return tuple(
-            Parameter(key, -np.inf, np.inf, np.inf, mean=1.0, linear=False) for key in self._keys
         )
 
     def advance(
@@ -129,7 +123,7 @@ class FormulaLaw(Law):
             there = {
                 name: float(np.broadcast_to(v, len(size))[row]) for name, v in variables.items()
             }
-            per_si = {key: 1.0 / si_factor(key) for key in self._keys}
+            per_si = {each.key: 1.0 / si_factor(each.key) for each in self.own}
             told = f"{self.id}: {self.formula.undefined(there, per_si)}"
             raise UndefinedFormulaError(told, float(at.block.time[row]))
         screws = np.outer(size, self.direction)

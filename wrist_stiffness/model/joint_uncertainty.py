@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.vector_keys import AXES
+from wrist_stiffness.model.parameters import AXES
 
 KEYS = {
     **{f"{axis}_um": 1e-6 for axis in AXES},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -23,7 +22,7 @@ gaps that no force decides; forces of joints that rub; screws and wrenches that 
 through the components; what the pose sensor says."""
 
 
-class Law(ABC):
+class Law:
     """A physical effect that may sit at one of several places.
 
     A law has no state of its own: what it must remember between blocks goes out as the state and
@@ -52,6 +51,8 @@ class Law(ABC):
     many_waves : bool
         Whether half a second of motion may go through more than one of its waves, so that no mean
         angle stands for what it did.
+    own : tuple of Parameter
+        Its parameters where they are the same at all places; else it overrides `parameters`.
     state_is_a_guess : bool
         Whether its state tells where the search for its answer begins, which changes the cost
         alone: it gets the state of the sample before, or what another model has at the same
@@ -75,6 +76,7 @@ class Law(ABC):
     signals: tuple[str, ...] = ()
     excited_by: str
     constant: bool = False
+    own: tuple[Parameter, ...]
     many_waves: bool = False
     state_is_a_guess: bool = False
     smooth: bool = True
@@ -86,9 +88,9 @@ class Law(ABC):
         """Whether the law is a user's own Python."""
         return not type(self).__module__.startswith("wrist_stiffness.model.")
 
-    @abstractmethod
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return the parameters that the law has at a place."""
+        return self.own
 
     def sized_by(self, place: str) -> tuple[str, ...]:
         """Return the parameters that may be large together, because the effect is: by default all.
@@ -117,6 +119,8 @@ class Law(ABC):
     ) -> tuple[Contribution, Any]:
         """Return what the effect adds at every sample of a block, and the state after it.
 
+        A law without memory overrides `added` instead.
+
         Parameters
         ----------
         at : Situation
@@ -140,7 +144,11 @@ class Law(ABC):
         MissingSignalError
             If a signal that it needs is absent.
         """
-        return NOTHING, None
+        return self.added(at, place, values), None
+
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+        """Return the same of a law that remembers nothing."""
+        return NOTHING
 
     def rounded(self, force: float | None) -> Law:
         """Return the law with what forces below `force` [N] turn over made gradual.

@@ -31,8 +31,7 @@ from wrist_stiffness.model.joint_uncertainty import KEYS, JointUncertainty
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.parameters import Estimate
-from wrist_stiffness.model.python_laws import require_python_laws
-from wrist_stiffness.model.registry import find_law, law_from_file
+from wrist_stiffness.model.registry import find_law, law_from_file, require_python_laws
 
 SCHEMA = 1
 FORMULA, PYTHON = "formula", "python"
@@ -195,8 +194,9 @@ def _effect(node: Node, folder: Path) -> Effect:
     values = {FORMULA: USERS_FORMULA, PYTHON: USERS_LAW}.get(str(word), CATALOGUE)(node)
     estimates = values.get("parameters", {})
     try:
+        law: Law
         if word == FORMULA:
-            law: Law = FormulaLaw(
+            law = FormulaLaw(
                 values["id"],
                 values["component"],
                 values["direction"],
@@ -204,20 +204,14 @@ def _effect(node: Node, folder: Path) -> Effect:
                 values.get("covariates", []),
                 list(estimates),
             )
+        elif word == PYTHON:
+            require_python_laws(values["class"])
+            law = law_from_file(values["class"], folder)
         else:
-            law = (
-                _users_law(values["class"], folder)
-                if word == PYTHON
-                else find_law(values["effect"])
-            )
+            law = find_law(values["effect"])
         return Effect(law, values["component"], estimates)
     except InputError as error:
         raise node.refuse(str(error)) from error
-
-
-def _users_law(reference: str, folder: Path) -> Law:
-    require_python_laws(reference)
-    return law_from_file(reference, folder)
 
 
 def _entry(effect: Effect, folder: Path) -> dict[str, Any]:

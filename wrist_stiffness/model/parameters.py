@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+
+from wrist_stiffness.mechanism.components import Array
 
 UNITS = {
     "um": 1e-6,
@@ -103,3 +106,36 @@ class Estimate:
 def symmetric(key: str, bound: float, scale: float) -> Parameter:
     """Return a linear parameter with bounds of both signs."""
     return Parameter(key, -bound, bound, scale)
+
+
+AXES = ("x", "y", "z")
+
+
+def axis_keys(pattern: str) -> tuple[str, ...]:
+    """Return three keys, `pattern` with `{}` replaced by x, y and z."""
+    return tuple(pattern.format(axis) for axis in AXES)
+
+
+def symmetric_vector(pattern: str, bound: float, scale: float) -> tuple[Parameter, ...]:
+    """Return three linear parameters with bounds of both signs."""
+    return tuple(symmetric(key, bound, scale) for key in axis_keys(pattern))
+
+
+def vector(values: Mapping[str, float], pattern: str) -> Array:
+    """Return the three values of a pattern, (3,)."""
+    return np.array([values[key] for key in axis_keys(pattern)])
+
+
+SHIFT, TURN = "shift_{}_um", "turn_{}_mdeg"
+
+
+TWIST = (*symmetric_vector(SHIFT, 1e5, 1000.0), *symmetric_vector(TURN, 2e4, 200.0))
+"""Six parameters of a small screw: where something was set up by hand."""
+
+
+def twist(values: Mapping[str, float]) -> Array:
+    """Return the small screw that six parameters state, (6,) [m, rad]."""
+    return np.concatenate([vector(values, SHIFT), vector(values, TURN)])
+
+
+FORCE, MOMENT = "f{}_N", "m{}_Nmm"

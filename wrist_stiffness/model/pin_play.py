@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.contacts import forces_of, solve_contacts
+from wrist_stiffness.mechanism.contact import forces_of, solve_contacts
 
 SMALL_FORCE = 1e-2
 """An end that carries less radial force than this does not reach its wall altogether [N]."""

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
-from wrist_stiffness.model.at_point import end_screws
 from wrist_stiffness.model.contribution import NOTHING, Contribution
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
+from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.rubbing import Rubbing, dragged, slip
 from wrist_stiffness.model.situation import Situation
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal
 
-from wrist_stiffness.mechanism.components import CARRIER, ELASTIC
+import numpy as np
+
+from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, Array
+from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.influence import LIMB_1
+from wrist_stiffness.mechanism.vectors import cross, unit
 
 Limb = Literal["limb_1", "limb_2", "both"]
 
@@ -27,3 +32,51 @@ THERMOMETERS = (*BODY, "ambient")
 
 MOTOR_JOINT = {"motor_1": "joint_1", "motor_2": "joint_5"}
 """The joint that carries what a motor carries."""
+
+
+NEIGHBOUR = {
+    "joint_1": "joint_2",
+    "joint_2": "joint_1",
+    "joint_3": "joint_4",
+    "joint_4": "joint_3",
+    "joint_5": "joint_4",
+}
+"""The joint at the other end of the link that a joint's cross axes are laid by."""
+
+
+def wrench_at(point: Array, wrench: Array) -> Array:
+    """Return at a point (3,) a wrench (n, 6) given at O: its moment less point x force."""
+    return np.concatenate([wrench[:, :3], wrench[:, 3:] - cross(point, wrench[:, :3])], axis=1)
+
+
+def screw_from(point: Array, screw: Array) -> Array:
+    """Return at O a screw (n, 6) given at a point (3,): its translation plus point x rotation."""
+    return np.concatenate([screw[:, :3] + cross(point, screw[:, 3:]), screw[:, 3:]], axis=1)
+
+
+def bushing_centre(geometry: Geometry, joint: str) -> Array:
+    """Return the centre of a joint's bushing at home, (3,) [m]."""
+    return geometry.bushings[joint].radius * geometry.axes[joint]
+
+
+def cross_axes(geometry: Geometry, joint: str) -> Array:
+    """Return the axes u, v, w of a joint at home as rows (3, 3).
+
+    w is the joint's axis, u is perpendicular to it and to the other axis of its link, v = w x u.
+    """
+    w = geometry.axes[joint]
+    u = unit(cross(w, geometry.axes[NEIGHBOUR[joint]]))
+    return np.stack([u, cross(w, u), w])
+
+
+@lru_cache(maxsize=32)
+def end_screws(geometry: Geometry, joint: str) -> Array:
+    """Return the screws for unit displacements of a sleeve's ends across its axis.
+
+    Gives (4, 6): upper end along u and v, lower end along u and v; at O in the joint's home frame.
+    """
+    axis, length = geometry.axes[joint], geometry.bushings[joint].length
+    across = cross_axes(geometry, joint)[:2]
+    turn = cross(axis, across) / length
+    local = np.concatenate([np.tile(0.5 * across, (2, 1)), np.concatenate([turn, -turn])], axis=1)
+    return screw_from(bushing_centre(geometry, joint), local)

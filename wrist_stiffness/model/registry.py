@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module, metadata, util
 from pathlib import Path
@@ -110,12 +111,12 @@ def law_of(found: object, place: str) -> Law:
     """
     if not (inspect.isclass(found) and issubclass(found, Law)):
         raise InputError(f"{place}: {found!r} is not a class derived from Law")
-    if inspect.isabstract(found):
-        missing = ", ".join(sorted(found.__abstractmethods__))
-        raise InputError(f"{place}: {found.__name__} does not define {missing}")
     wanted = ("id", "stage", "places", "sentence", "check", "excited_by")
-    if missing := ", ".join(name for name in wanted if not hasattr(found, name)):
-        raise InputError(f"{place}: {found.__name__} does not define {missing}")
+    missing = [*getattr(found, "__abstractmethods__", ())]
+    if found.parameters is Law.parameters and not hasattr(found, "own"):
+        missing.append("parameters")
+    if missing := [*missing, *(name for name in wanted if not hasattr(found, name))]:
+        raise InputError(f"{place}: {found.__name__} does not define {', '.join(missing)}")
     law = found()
     require_id(law.id)
     if law.stage not in STAGES:
@@ -179,3 +180,30 @@ def law_from_file(reference: str, folder: Path) -> Law:
     law = law_of(getattr(module, name), reference)
     law.file = path
     return law
+
+
+ALLOWED = "WRIST_STIFFNESS_ALLOW_PYTHON_LAWS"
+"""Environment variable: what a command may run, the processes that it starts may run."""
+
+
+@contextmanager
+def python_laws(allowed: bool) -> Iterator[None]:
+    """Let models name Python files as laws, or leave it as it was."""
+    before = os.environ.get(ALLOWED, "")
+    os.environ[ALLOWED] = "1" if allowed else before
+    try:
+        yield
+    finally:
+        os.environ[ALLOWED] = before
+
+
+def require_python_laws(reference: str) -> None:
+    """Refuse the Python file that a model names, unless somebody said that it may be run.
+
+    Raises `InputError` with how to say so.
+    """
+    if os.environ.get(ALLOWED) != "1":
+        raise InputError(
+            f"{reference} is a program, and none is run unasked: if you trust it, "
+            "allow_python_laws (a node's parameter) or --allow-python-laws (a command's option)"
+        )

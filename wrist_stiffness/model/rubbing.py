@@ -9,8 +9,8 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.at_point import end_screws
 from wrist_stiffness.model.contribution import Contribution
+from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.situation import Situation, lengths
 
 LEAST_BUDGET = 1e-9

@@ -8,19 +8,24 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.lookup.table import Evaluation, Table
+from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
-from wrist_stiffness.mechanism.contacts import forces_of, solve_contacts
-from wrist_stiffness.mechanism.energy import component_wrenches
+from wrist_stiffness.mechanism.contact import forces_of, solve_contacts
+from wrist_stiffness.mechanism.energy import component_wrenches, flange_screws
 from wrist_stiffness.mechanism.influence import IN_LIMB_1, Influence
 from wrist_stiffness.mechanism.statics import ContactOperators, component_rotations, slides
-from wrist_stiffness.mechanism.vectors import block_diagonal, dot
+from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
-from wrist_stiffness.model.constants import Constants
-from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError, together
+from wrist_stiffness.model.contribution import (
+    NOTHING,
+    Constants,
+    Contribution,
+    MissingSignalError,
+    together,
+)
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 
@@ -50,11 +55,6 @@ class Situation:
     def configuration(self) -> Configuration:
         """Configurations of shape (n,)."""
         return self.statics.configuration
-
-    @property
-    def evaluation(self) -> Evaluation:
-        """`closed_form` or `spline`."""
-        return self.statics.evaluation
 
     @property
     def table(self) -> Table:
@@ -217,11 +217,7 @@ class Situation:
         the flange sectors [N].  Gives (n, 8, 6): at O in F [m, rad].
         """
         screws: Array = (self.statics.turned_flexibility @ through[..., None])[..., 0]
-        own = self.parts.sectors.component
-        turn = block_diagonal(component_rotations(self.configuration).take(own, axis=-3))
-        pressed = np.einsum("nmij,mj,nm->nmi", turn, self.parts.sectors.screw, force)
-        belongs = own[:, None] == np.arange(len(ELASTIC))
-        return screws + np.einsum("nmi,mk->nki", pressed, belongs)
+        return screws + flange_screws(self.configuration, self.parts, force)
 
     @cached_property
     def slides(self) -> Array:

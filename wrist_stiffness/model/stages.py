@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import is_
 from pathlib import Path
 from traceback import extract_tb
 from types import MappingProxyType
@@ -22,10 +23,10 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
-from wrist_stiffness.model.constants import Constants
 from wrist_stiffness.model.contribution import (
     LEFT_OUT,
     NOTHING,
+    Constants,
     Contribution,
     MissingSignalError,
 )
@@ -168,13 +169,9 @@ def _after(
         return at
     if like is not None and like.situations[number] is at:
         other = like.added(SAMPLE_STAGES[number])
-        if len(other) == len(added) and all(map(_same, other, added)):
+        if len(other) == len(added) and all(map(is_, other, added)):
             return like.situations[number + 1]
     return at.with_more(sum(added, at.given))
-
-
-def _same(one: object, other: object) -> bool:
-    return one is other
 
 
 class AtHome:

@@ -335,6 +335,3 @@ def _bytes(record: Any) -> bytes:
     record.write(builder)
     data: bytes = builder.end()
     return data
-
-
-__all__ = ["ChunkWriter", "Messages"]

@@ -31,17 +31,9 @@ from mcap.writer import MCAP0_MAGIC
 
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.inputs.opening import open_input
-from wrist_stiffness.recording.channel import Channel
-from wrist_stiffness.recording.mcap_chunk import (
-    RECORD_HEAD,
-    Chunk,
-    Contents,
-    Span,
-    Spans,
-    contents_of,
-)
-from wrist_stiffness.recording.mcap_definitions import (
+from wrist_stiffness.recording.channel import (
     UNREADABLE,
+    Channel,
     Definition,
     Definitions,
     Key,
@@ -49,6 +41,14 @@ from wrist_stiffness.recording.mcap_definitions import (
     definition,
     definitions_in,
     named,
+)
+from wrist_stiffness.recording.mcap_chunk import (
+    RECORD_HEAD,
+    Chunk,
+    Contents,
+    Span,
+    Spans,
+    contents_of,
 )
 from wrist_stiffness.recording.mcap_resume import next_record
 

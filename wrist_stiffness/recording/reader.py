@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Literal
@@ -19,13 +20,50 @@ from wrist_stiffness.recording.mcap_chunk import (
     Chunk,
     Contents,
     Payloads,
+    Span,
     Times,
     contents_of,
 )
 from wrist_stiffness.recording.mcap_index import McapIndex, index_mcap
 from wrist_stiffness.recording.messages import Message
 from wrist_stiffness.recording.raw_block import Integers, RawBlock, RawMessage
-from wrist_stiffness.recording.topic_info import TopicInfo, topics_of
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """One topic of a recording."""
+
+    # `name`, `ros_type`: topic and ``package/msg/Type``
+    name: str
+    ros_type: str
+    count: int  # number of messages
+    # `first_ns`, `last_ns`: log time of the first and last message; None without messages
+    first_ns: int | None
+    last_ns: int | None
+    is_readable: bool  # whether the type is one that this project decodes
+
+
+def topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:
+    """Return the topics of files that belong together, by name."""
+    spans: dict[tuple[str, str, bool], Span | None] = {}
+    for index in indices:
+        own = index.spans
+        for channel_id, channel in index.channels.items():
+            key = (channel.topic, channel.ros_type, channel.message_type is not None)
+            span, known = own.get(channel_id), spans.get(key)
+            spans[key] = span.joined(known) if span and known else span or known
+    return tuple(
+        TopicInfo(
+            name=name,
+            ros_type=ros_type,
+            count=span.count if span else 0,
+            first_ns=span.first_ns if span else None,
+            last_ns=span.last_ns if span else None,
+            is_readable=is_readable,
+        )
+        for (name, ros_type, is_readable), span in sorted(spans.items(), key=lambda item: item[0])
+    )
+
 
 MOST_OPENED_BYTES = 256 << 20
 """Of chunks that overlap in time.  A recorder's overlap by as much as a message is late."""
@@ -78,16 +116,8 @@ class Recording:
     def raw_messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """Iterate over the stored messages, in log-time order, without decoding.
 
-        Parameters
-        ----------
-        topics : Collection[str], optional
-            Names to keep; None keeps all.
-
-        Yields
-        ------
-        RawMessage
-            Ties in log time come in the order of the file.  Memory is bounded by the chunks that
-            overlap in time.
+        `topics`: names to keep; None keeps all.  Ties in log time come in the order of the file.
+        Memory is bounded by the chunks that overlap in time; too many are a `RecordingError`.
         """
         for part in self._parts(topics):
             yield from part.messages()
@@ -97,22 +127,10 @@ class Recording:
     ) -> Iterator[RawBlock]:
         """Iterate over the stored messages in log-time order, many at a time, without decoding.
 
-        Parameters
-        ----------
-        topics : Collection[str], optional
-            Names to keep; None keeps all.
-        least : int
-            So many messages at a time or up to a chunk more, or fewer that are large.
+        They are those of `raw_messages`, in the same order.
 
-        Yields
-        ------
-        RawBlock
-            The same messages in the same order as `raw_messages`.
-
-        Raises
-        ------
-        RecordingError
-            As `raw_messages`.
+        `topics`: names to keep; None keeps all; `least`: so many messages at a time or up to a
+        chunk more, or fewer that are large.
         """
         waiting: list[RawBlock] = []
         for part in self._parts(topics):
@@ -176,29 +194,15 @@ class Recording:
         yield from _earlier(opened, LAST_TIME_NS, len(chunks))
 
     def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Times, Payloads]]:
-        """Iterate over the payloads of topics, many of one topic at a time.
-
-        Yields
-        ------
-        tuple[str, array, Payloads]
-            Topic, log times [ns] and payloads, in their order.
-        """
+        """Iterate over topic, log times [ns] and payloads, many of one topic at a time."""
         for block in self.blocks(topics, PAYLOADS_AT_A_TIME):
             for topic, rows in block.topics().items():
                 yield topic, block.time_ns[rows], block.payloads(rows)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, Message]]:
-        """Iterate over the decoded messages in log-time order.
+        """Iterate over topic, log time [ns] and decoded message, in log-time order.
 
-        Parameters
-        ----------
-        topics : Collection[str], optional
-            Names to keep; None keeps all whose type is known.
-
-        Yields
-        ------
-        tuple[str, int, Message]
-            Topic, log time [ns], message.
+        `topics`: names to keep; None keeps all whose type is known.
         """
         self._undecodable.clear()
         for channel, log_time_ns, payload in self.raw_messages(topics):

@@ -52,69 +52,61 @@ DEFAULT_JOINTS = ("motor_1_joint", "motor_2_joint")
 
 
 @dataclass(frozen=True)
-class JointSamples:
-    """Two joints: stamps, log times (n,) [ns], positions, velocities, efforts (n, 2) [rad, N m].
-
-    Velocity and effort are NaN where the message has none.
-    """
+class HeaderSamples:
+    """Stamps, log times (n,) [ns] and frames (n,) of messages with a header."""
 
     time_ns: TimeArray
     log_time_ns: TimeArray
     frame_id: TextArray
+
+
+@dataclass(frozen=True)
+class JointSamples(HeaderSamples):
+    """Two joints: positions, velocities, efforts (n, 2) [rad, N m].
+
+    Velocity and effort are NaN where the message has none.
+    """
+
     position: FloatArray
     velocity: FloatArray
     effort: FloatArray
 
 
 @dataclass(frozen=True)
-class WrenchSamples:
+class WrenchSamples(HeaderSamples):
     """Wrenches (n, 6) [N, N m], force first, as expressed in `frame_id` (n,)."""
 
-    time_ns: TimeArray
-    log_time_ns: TimeArray
-    frame_id: TextArray
     wrench: FloatArray
 
 
 @dataclass(frozen=True)
-class PoseSamples:
+class PoseSamples(HeaderSamples):
     """Positions (n, 3) [m], quaternions (n, 4) scalar last, covariances (n, 6, 6) or NaN."""
 
-    time_ns: TimeArray
-    log_time_ns: TimeArray
-    frame_id: TextArray
     position: FloatArray
     quaternion: FloatArray
     covariance: FloatArray
 
 
 @dataclass(frozen=True)
-class MarkerSamples:
+class MarkerSamples(HeaderSamples):
     """Markers (n, k, 3) [m] in the order of the message; NaN = lost."""
 
-    time_ns: TimeArray
-    log_time_ns: TimeArray
-    frame_id: TextArray
     position: FloatArray
 
 
 @dataclass(frozen=True)
-class GaugeSamples:
+class GaugeSamples(HeaderSamples):
     """Readings (n, k) [m, rad] by the names (n, k) of what was read; NaN = not read."""
 
-    time_ns: TimeArray
-    log_time_ns: TimeArray
-    frame_id: TextArray
     value: FloatArray
     names: TextArray
 
 
 @dataclass(frozen=True)
-class ScalarSamples:
+class ScalarSamples(HeaderSamples):
     """Numbers (n,) of one sensor; a message without a header has its log time as stamp."""
 
-    time_ns: TimeArray
-    log_time_ns: TimeArray
     value: FloatArray
 
 
@@ -245,8 +237,6 @@ def _made(kind: Callable[..., _Kind], rows: Rows, **shapes: tuple[int, ...]) -> 
         **{name: np.empty((0, *shape)) for name, shape in shapes.items()},
     }
     columns.update(rows)
-    if kind is ScalarSamples:
-        del columns["frame_id"]
     return kind(**columns)
 
 

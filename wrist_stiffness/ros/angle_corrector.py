@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.parameters import CORRECTION, PASS_THROUGH, correction_settings
 from wrist_stiffness.compensation.payload import Payload
-from wrist_stiffness.compensation.perishable import require_fresh
+from wrist_stiffness.compensation.safety import require_fresh
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.recording.cdr import decode
@@ -34,8 +34,9 @@ from wrist_stiffness.ros.stream_messages import (
     error_payload,
     joint_payload,
     joint_reader,
+    plan_payload,
+    read_plan,
 )
-from wrist_stiffness.ros.trajectory_message import plan_payload, read_plan
 from wrist_stiffness.ros.wrist_node import WristNode
 from wrist_stiffness.topics import (
     MILLIDEGREES,

@@ -26,7 +26,6 @@ from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import FRAMES_PREFIXED, ParameterEntry
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.ros.answer_count import AnswerCount
 from wrist_stiffness.ros.conversions import (
     joint_message,
     nanoseconds,
@@ -51,27 +50,49 @@ from wrist_stiffness.topics import (
     relative,
 )
 
+
+class AnswerCount:
+    """Answers of one node, heard in the order of the samples.
+
+    `first`: number of the first sample that the node was asked.
+    """
+
+    def __init__(self, first: int) -> None:
+        self._first = first
+        self._silence = self._heard = 0
+        self.last = first - 1  # number of the newest sample that was answered
+
+    def hear(self, number: int) -> None:
+        """Count the answer to a sample by its number."""
+        if number > self.last:
+            self._silence = self.silence(number)
+            self._heard += 1
+            self.last = number
+
+    def asked(self, end: int) -> int:
+        """Return how many samples before number `end` the node was asked."""
+        return end - self._first
+
+    def missing(self, end: int) -> int:
+        """Return to how many of these no answer was heard."""
+        return self.asked(end) - self._heard
+
+    def silence(self, end: int) -> int:
+        """Return how many samples before number `end` were without an answer in a row, at most."""
+        return max(self._silence, end - self.last - 1)
+
+
 PARAMETERS = (
     ParameterEntry("model_file", "", "model whose table is the true wrist; empty: the shipped one"),
-    ParameterEntry("rate_hz", 100.0, "samples per second", lower=RATES_HZ[0], upper=RATES_HZ[1]),
+    ParameterEntry("rate_hz", 100.0, "samples per second", RATES_HZ),
     ParameterEntry("experiment", "rich", "what the motion is", choices=tuple(EXPERIMENTS)),
-    ParameterEntry("program_s", 60.0, "length of the motion [s]", lower=1.0, upper=86400.0),
+    ParameterEntry("program_s", 60.0, "length of the motion [s]", (1.0, 86400.0)),
     ParameterEntry(
-        "programs",
-        0,
-        "how often the motion is done, then the node ends; 0: for ever",
-        lower=0,
-        upper=1e9,
+        "programs", 0, "how often the motion is done, then the node ends; 0: for ever", (0, 1e9)
     ),
+    ParameterEntry("seed", 0, "of the program and of the sensors' noise", (0, LARGEST_SEED)),
     ParameterEntry(
-        "seed", 0, "of the program and of the sensors' noise", lower=0, upper=LARGEST_SEED
-    ),
-    ParameterEntry(
-        "listeners",
-        0,
-        "subscriptions of /joint_states to wait for before moving",
-        lower=0,
-        upper=100,
+        "listeners", 0, "subscriptions of /joint_states to wait for before moving", (0, 100)
     ),
     ParameterEntry(
         "enable_at_repeat", False, "switch the angle corrector on when the motion repeats"

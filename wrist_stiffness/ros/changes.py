@@ -82,28 +82,10 @@ async def all_or_none(
 ) -> str:
     """Make a change in all nodes of a namespace, or in none.
 
-    Parameters
-    ----------
-    node : Node
-        Asks; others of its namespace that offer the change are asked like itself.
-    action : str
-        Name of the change.
-    service_type : type
-        Of `~/ACTION/prepare`.
-    request
-        Of that type.
-    longest_s : float
-        How long a preparation may take [s].
-
-    Returns
-    -------
-    str
-        What the nodes said.
-
-    Raises
-    ------
-    InputError
-        With what each node that cannot says; nothing has changed then.
+    `node`: asks; others of its namespace that offer the change are asked like itself; `action`:
+    name of the change; `service_type`, `request`: of `~/ACTION/prepare`; `longest_s`: how long a
+    preparation may take [s].  Gives what the nodes said.  Raises `InputError` with what each node
+    that cannot says; nothing has changed then.
     """
     ending = f"/{action}/{PREPARE}"
     base = node.get_namespace().rstrip("/") + "/"

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
 
+import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import (
     Point,
     Pose,
     PoseStamped,
     Quaternion,
+    TransformStamped,
     Vector3,
     WrenchStamped,
 )
@@ -18,6 +22,8 @@ from sensor_msgs.msg import JointState
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.configuration import BODIES, Configuration
+from wrist_stiffness.mechanism.urdf import FRAMES
 from wrist_stiffness.topics import BASE_FRAME
 
 
@@ -86,3 +92,31 @@ def joint_message(
     message.header.stamp = time_message(stamp_ns)
     message.header.frame_id = frame_id
     return message
+
+
+def body_transforms(
+    stamp_ns: int, configuration: Configuration, prefix: str = ""
+) -> list[TransformStamped]:
+    """Return where the rigid wrist's bodies are in `wrist_base`, by prefix and names of its URDF.
+
+    The platform's frame is the nominal one: the error is `/pose_error_predicted`, in `wrist_base`.
+    """
+    found = []
+    for body, rotation in zip(BODIES, configuration.bodies, strict=True):
+        if FRAMES[body] == BASE_FRAME:
+            continue
+        message = TransformStamped(child_frame_id=prefix + FRAMES[body])
+        message.header.frame_id = prefix + BASE_FRAME
+        message.header.stamp = time_message(stamp_ns)
+        quaternion = Rotation.from_matrix(rotation).as_quat(canonical=True)
+        message.transform.rotation = pose_message(np.zeros(3), quaternion).orientation
+        found.append(message)
+    return found
+
+
+def transforms_type() -> type | None:
+    """Return tf2_msgs/TFMessage, None where it is not installed: ROS from PyPI is without it."""
+    if find_spec("tf2_msgs") is None:
+        return None
+    found: type = import_module("tf2_msgs.msg").TFMessage
+    return found

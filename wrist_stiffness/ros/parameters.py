@@ -33,16 +33,13 @@ def descriptor(entry: ParameterEntry) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(description=entry.text, read_only=entry.fixed)
     if entry.choices:
         descriptor.additional_constraints = f"one of {', '.join(entry.choices)}"
-    if entry.lower is None or entry.upper is None:
+    if entry.limits is None:
         return descriptor
+    lower, upper = entry.limits
     if isinstance(entry.default, float):
-        descriptor.floating_point_range = [
-            FloatingPointRange(from_value=entry.lower, to_value=entry.upper)
-        ]
+        descriptor.floating_point_range = [FloatingPointRange(from_value=lower, to_value=upper)]
     else:
-        descriptor.integer_range = [
-            IntegerRange(from_value=int(entry.lower), to_value=int(entry.upper))
-        ]
+        descriptor.integer_range = [IntegerRange(from_value=int(lower), to_value=int(upper))]
     return descriptor
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NoReturn
 
 import numpy as np
@@ -14,15 +15,14 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from wrist_stiffness.commands.wrist_drawing import Pace, drawing_of
+from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import PREDICTION, prediction_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.urdf import urdf
 from wrist_stiffness.model.error_model import Prediction
-from wrist_stiffness.ros import static_transforms
-from wrist_stiffness.ros.body_transforms import body_transforms
-from wrist_stiffness.ros.load_wait import LoadWait
+from wrist_stiffness.ros.conversions import body_transforms, transforms_type
 from wrist_stiffness.ros.qos import SENSOR_QOS, STATE_QOS
 from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import (
@@ -44,6 +44,48 @@ from wrist_stiffness.topics import (
     WRIST_MARKERS,
 )
 
+
+class LoadWait:
+    """Joint states that wait for the load that belongs to them, in order of arrival.
+
+    A joint state is ready when a load with its own or a later stamp has arrived, for then no other
+    load can belong to it, or when it has waited for long enough.
+
+    `limit_s`: longest wait [s]; `clock_ns`: a clock that never jumps [ns].
+    """
+
+    def __init__(self, limit_s: float, clock_ns: Callable[[], int]) -> None:
+        self._limit_ns = round(limit_s * NANOSECONDS)
+        self._clock_ns = clock_ns
+        self._waiting: deque[tuple[int, JointSample]] = deque()
+
+    def __len__(self) -> int:
+        """Return how many wait."""
+        return len(self._waiting)
+
+    def forget(self) -> None:
+        """Drop all."""
+        self._waiting.clear()
+
+    def put(self, joints: JointSample) -> None:
+        """Add a joint state."""
+        self._waiting.append((self._clock_ns() + self._limit_ns, joints))
+
+    def ready(self, newest_load_ns: int | None) -> Iterator[JointSample]:
+        """Take out what need not wait any longer, in order of arrival.
+
+        `newest_load_ns`: newest stamp of the loads [ns].
+        """
+        now_ns = self._clock_ns()
+        while self._waiting:
+            deadline_ns, joints = self._waiting[0]
+            has_load = newest_load_ns is not None and joints.stamp_ns <= newest_load_ns
+            if not has_load and now_ns < deadline_ns:
+                return
+            self._waiting.popleft()
+            yield joints
+
+
 CHECKS_PER_WAIT = 4
 """How often, within the longest wait, overdue joint states are looked for."""
 
@@ -61,7 +103,7 @@ class PoseErrorPredictor(WristNode):
         self._phi_mdeg = self.say(Vector3Stamped, POSE_ERROR_PHI_MDEG)
         self._markers = self.say(MarkerArray, WRIST_MARKERS)
         self._description = self.say(String, ROBOT_DESCRIPTION, STATE_QOS)
-        self._transforms_type = static_transforms.message_type()
+        self._transforms_type = transforms_type()
         if self._transforms_type is not None:
             self._transforms = self.say(self._transforms_type, TF)
         wait_s = self.get_parameter("load_wait_s").value

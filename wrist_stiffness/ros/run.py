@@ -35,10 +35,7 @@ def run(make_node: Callable[[], Node]) -> NoReturn:
 
     One thread: the multi-threaded executor loses messages under load.
 
-    Parameters
-    ----------
-    make_node : callable
-        Makes the node once ROS is initialised.
+    `make_node`: makes the node once ROS is initialised.
 
     Ends with 0, with 2 if the node cannot start, go on or end as asked (one line on stderr says
     why), or as the node says with a SystemExit.
@@ -116,11 +113,8 @@ def _listen_to_signals() -> list[int]:
     printed as a traceback.  A callback that never returns, of a user's law or of the middleware,
     never sees that the context is shut down.
 
-    Returns
-    -------
-    list of int
-        Not empty after a signal, also one that comes before rclpy listens. No event: the next
-        signal may come while its lock is held.
+    Gives a list that is not empty after a signal, also one that comes before rclpy listens.  No
+    event: the next signal may come while its lock is held.
     """
     told_to_end: list[int] = []
 

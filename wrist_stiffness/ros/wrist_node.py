@@ -17,16 +17,15 @@ from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
+from wrist_stiffness.compensation.intake import transform_of
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import COMMON, ParameterEntry, stream_settings
 from wrist_stiffness.compensation.settings import StreamSettings
-from wrist_stiffness.compensation.static_transforms import transform_of
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.ros import static_transforms
 from wrist_stiffness.ros.changes import Change, until
-from wrist_stiffness.ros.conversions import nanoseconds
+from wrist_stiffness.ros.conversions import nanoseconds, transforms_type
 from wrist_stiffness.ros.guarded_node import (
     ACTIVE,
     ALL_STATES,
@@ -121,7 +120,7 @@ class WristNode(GuardedNode, ABC):
 
     def _hear_signals(self) -> None:
         """Hear what all nodes need; a load is taken before a joint state that waits."""
-        transforms = static_transforms.message_type()
+        transforms = transforms_type()
         if transforms is not None:
             self.hear(transforms, TF_STATIC, self._on_tf_static, STATIC_QOS, ALL_STATES)
         loads = wrench_reader()

@@ -9,7 +9,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.simulation.laws.axis_misalignment import AxisMisalignment
-from wrist_stiffness.simulation.laws.flange_contact import FlangeGap
+from wrist_stiffness.simulation.laws.joint_play import FlangeGap
 from wrist_stiffness.simulation.laws.law import Law
 from wrist_stiffness.simulation.laws.load_sensor import LoadMatrix
 from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness

@@ -19,9 +19,8 @@ from wrist_stiffness.simulation.drive import Drive
 from wrist_stiffness.simulation.exact import ExactWrist
 from wrist_stiffness.simulation.experiment import experiment
 from wrist_stiffness.simulation.heat import HEATED
-from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, instrument
+from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, PoseView, instrument
 from wrist_stiffness.simulation.laws.law import Law
-from wrist_stiffness.simulation.pose_view import PoseView
 from wrist_stiffness.simulation.program import Program
 from wrist_stiffness.simulation.wrist import TrueState, TrueWrist
 
@@ -45,7 +44,7 @@ class CellSettings:
     program_seed: int = 0  # chooses poses and loads of the program
     experiment: str = "rich"  # design of the program, one of `experiment.EXPERIMENTS`
     instrument: str = "interferometer"  # pose sensor: `interferometer`, `tracker`, `cmm` or `ideal`
-    sees: str = "pose"  # what of the pose it measures, one of `pose_view.VIEWS`
+    sees: str = "pose"  # what of the pose it measures, one of `instrument.VIEWS`
     lost_beams: float = 0.0  # share of its samples that are missing or wild
     load_sensor: LoadSensor = LoadSensor()  # noise of the load estimate
     hidden: tuple[HiddenEffect, ...] = ()  # what the true wrist has besides its base

@@ -27,7 +27,7 @@ from wrist_stiffness.mechanism.statics import (
     component_rotations,
     contact_operators,
     platform_twist,
-    weight_response,
+    weight_wrench,
 )
 from wrist_stiffness.mechanism.vectors import block_diagonal
 
@@ -83,7 +83,7 @@ class Pose:
         self.operators: ContactOperators = contact_operators(configuration, parts, gravity)
         self.rows = self.projectors.slides()
         self._carry = block_diagonal(np.swapaxes(self.projectors.of_components(), -1, -2))
-        self._weight = weight_response(configuration, parts, gravity)
+        self._weight = weight_wrench(configuration, parts, gravity, self.projectors)
         rotation = block_diagonal(component_rotations(configuration))
         self.flexibility = rotation @ parts.flexibility @ np.swapaxes(rotation, -1, -2)
         own = parts.sectors.component
@@ -140,26 +140,14 @@ class Pose:
     ) -> Equilibrium:
         """Find the equilibrium.
 
-        Parameters
-        ----------
-        load : (n, 6) float
-            Wrench on the platform at O in F.
-        screws : (n, 8, 6) float
-            Screws at the components that no wrench changes [m, rad].
-        bends : sequence of (int, Bend)
-            Number of a component and its law besides its elasticity.
-        extra : (n, 8, 6) float, optional
-            Wrench through the components from inside the wrist, friction for instance.
-        near : Equilibrium, optional
-            Where the iteration begins.
-
-        Raises
-        ------
-        InputError
-            If Newton's method does not converge.
+        `load` (n, 6): wrench on the platform at O in F; `screws` (n, 8, 6): screws at the
+        components that no wrench changes [m, rad]; `bends`: number of a component and its law
+        besides its elasticity; `extra` (n, 8, 6): wrench through the components from inside the
+        wrist, friction for instance; `near`: where the iteration begins.  Raises `InputError` if
+        Newton's method does not converge.
         """
         ops, n_k = self.operators, self.operators.screw_gap
-        free = self._weight.wrench + (self._carry @ load[:, None, :, None])[..., 0]
+        free = self._weight + (self._carry @ load[:, None, :, None])[..., 0]
         gap = ops.gap + _times(np.swapaxes(ops.force_twist, -1, -2), load)
         given = screws
         if extra is not None:

@@ -173,11 +173,7 @@ def heavy(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Pro
 
 
 EXPERIMENTS: dict[str, Callable[[Workspace, np.random.Generator, float], Program]] = {
-    "rich": rich,
-    "paper": paper,
-    "dead_weights": dead_weights,
-    "production": production,
-    "heavy": heavy,
+    each.__name__: each for each in (rich, paper, dead_weights, production, heavy)
 }
 
 

@@ -25,14 +25,14 @@ from wrist_stiffness.simulation.laws.added_spring import (
     drive_flexibility,
 )
 from wrist_stiffness.simulation.laws.axis_misalignment import AxisMisalignment
-from wrist_stiffness.simulation.laws.bushing_polymer import BushingHardening, ThermalSoftening
+from wrist_stiffness.simulation.laws.bushing_polymer import (
+    BushingHardening,
+    Creep,
+    ThermalSoftening,
+)
 from wrist_stiffness.simulation.laws.cable_wrench import CableWrench
-from wrist_stiffness.simulation.laws.creep import Creep
-from wrist_stiffness.simulation.laws.flange_contact import FlangeGap
-from wrist_stiffness.simulation.laws.gravity import AddedMass, MountingTilt
-from wrist_stiffness.simulation.laws.inertia import Inertia
-from wrist_stiffness.simulation.laws.joint_clearance import JointClearance
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
+from wrist_stiffness.simulation.laws.joint_play import FlangeGap, JointClearance
 from wrist_stiffness.simulation.laws.law import DRIVEN, JOINED, Law
 from wrist_stiffness.simulation.laws.load_sensor import (
     LoadBias,
@@ -47,6 +47,7 @@ from wrist_stiffness.simulation.laws.motor_turn import (
     TransmissionError,
 )
 from wrist_stiffness.simulation.laws.part_stiffness import EndHinge, UniformSoftness
+from wrist_stiffness.simulation.laws.point_mass import AddedMass, Inertia, MountingTilt
 from wrist_stiffness.simulation.laws.pose_sensor import Drift, MeasurementFrame, TargetMounting
 from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
 from wrist_stiffness.simulation.laws.time_delay import TimeDelay

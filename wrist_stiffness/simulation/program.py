@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 
 SPEED_SPAN_S = 4e-3
@@ -18,17 +17,10 @@ class Track:
     """Values at knots, joined by minimum-jerk transitions (Flash and Hogan 1985).
 
     Two equal values in a row are a rest.
-
-    Raises `InputError` if the knots do not increase from zero.
     """
 
     time_s: Array  # (m,), increasing, beginning with 0 [s]
     values: Array  # (m, d), value at each knot
-
-    def __post_init__(self) -> None:
-        """Check the knots."""
-        if self.time_s[0] != 0.0 or not np.all(np.diff(self.time_s) > 0.0):
-            raise InputError("program: the times of the knots do not increase from zero")
 
     def __call__(self, time_s: Array) -> Array:
         """Return the values (..., d) at times (...) [s]; beyond the ends they are held."""

@@ -8,18 +8,19 @@ one sample: that of the pose instrument, and a hidden encoder count spread over 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.components import ELASTIC, Array
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSample, CellSettings, VirtualCell
+from wrist_stiffness.simulation.equilibrium import Pose
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
-from wrist_stiffness.simulation.residual import base_pose, departure
 
 SIZE_TOLERANCE = 2e-3
 """Relative, of the size that `magnitude_for` reaches."""
@@ -30,7 +31,48 @@ FASTEST_HZ = 200.0
 """Sizes of faster experiments are found at this rate: no law's size depends on more."""
 
 BLOCK = 2000
-"""Samples whose inner state is in memory at a time."""
+"""Samples whose operators and inner state are in memory at a time."""
+
+
+@dataclass(frozen=True)
+class BasePose:
+    """Poses (n) that the base predicts: rotation (n, 3, 3) U -> F, and place (n, 3) of O [m]."""
+
+    rotation: Array
+    shift: Array
+
+
+def base_pose(table: Table, encoder: Array, wrench: Array) -> BasePose:
+    """Return where the platform would be by the base alone.
+
+    `encoder` (n, 2): motor angles [rad]; `wrench` (n, 6): load on the platform at O in F [N, N m].
+    Gives `BasePose`: of n samples.
+    """
+    rotations, shifts = [], []
+    for first in range(0, len(encoder), BLOCK):
+        rows = slice(first, first + BLOCK)
+        configuration = table.mechanism.forward(encoder[rows])
+        pose = Pose(configuration, table.components, table.geometry.gravity)
+        screws = np.zeros((len(configuration.theta), len(ELASTIC), 6))
+        bent, moved = exp_twist(pose.solve(wrench[rows], screws).twist)
+        rotations.append(bent @ configuration.platform)
+        shifts.append(moved)
+    return BasePose(np.concatenate(rotations), np.concatenate(shifts))
+
+
+def departure(rotation: Array, shift: Array, base: BasePose) -> Array:
+    """Return log(T T_base^-1) at O in F for poses T, (n, 6) [m, rad]."""
+    turn = rotation @ np.swapaxes(base.rotation, -1, -2)
+    return log_motion(turn, shift - (turn @ base.shift[..., None])[..., 0])
+
+
+def residual(table: Table, sample: CellSample) -> Array:
+    """Return log(T_measured T_base^-1) for the readings of angles and load.
+
+    `sample`: n samples with whole poses.  Gives (n, 6): twist at O in F [m, rad].
+    """
+    base = base_pose(table, sample.encoder, sample.wrench)
+    return departure(sample.measured_rotation, sample.measured_shift, base)
 
 
 def sample_covariance(table: Table, theta: Array, name: str) -> Array:

@@ -1,5 +1,5 @@
 /* What of a load is a payload, for one command after the other: `judge` and `share` of
- * `compensation/supervisor.py`, with `payload.py` and `applied_share.py`; to the bit. */
+ * `compensation/supervisor.py`, with `belief.py` and `payload.py`; to the bit. */
 #include "wrist.h"
 
 enum { UNSURE, FREE, HOLDING, IN_CONTACT, RELEASED };

@@ -1,1 +1,1 @@
-"""The catalogue: one file per law, found by `model.registry`."""
+"""The catalogue: laws of one kind in one file, found by `model.registry`."""

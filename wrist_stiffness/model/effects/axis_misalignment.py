@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import JOINTS
-from wrist_stiffness.model.at_point import cross_axes
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
+from wrist_stiffness.model.places import cross_axes
 from wrist_stiffness.model.situation import Situation
 
 SHIFTS = {
@@ -52,13 +51,11 @@ class AxisMisalignment(Law):
             *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in TILTS[place]),
         )
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the screw, turned with its body."""
         axes = cross_axes(at.table.geometry, place)
         shift, tilt = (
             np.array([values[f"{kind}_{axis}_{unit}"] for axis in felt]) @ axes[: len(felt)]
             for kind, felt, unit in (("shift", SHIFTS[place], "um"), ("tilt", TILTS[place], "mdeg"))
         )
-        return at.screw(place, np.concatenate([shift, tilt])), None
+        return at.screw(place, np.concatenate([shift, tilt]))

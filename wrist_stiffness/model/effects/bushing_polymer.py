@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from wrist_stiffness.mechanism.components import ELASTIC, JOINTS
+from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, Array
 from wrist_stiffness.model.columns import Recipe, share_of_shape, tangents
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.model.scaled_part import extra
+from wrist_stiffness.model.places import LIMB
 from wrist_stiffness.model.situation import Situation, lengths
 from wrist_stiffness.model.warmth import WARMTH, lagged, unused, warmth
+
+HARDENINGS = (5.0, 50.0, 300.0)
+TIMES_S = (2.0, 8.0, 25.0, 90.0, 400.0)
+"""Hardenings and time constants that are tried first."""
 
 
 class BushingHardening(Law):
@@ -23,23 +27,17 @@ class BushingHardening(Law):
     sentence = "the bushing of {place} stiffens as its force grows"
     check = "load the joint in steps with a dial gauge: are equal steps equally large?"
     excited_by = "the same pose under loads of at least three sizes"
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the loss of flexibility by the force."""
-        grid = (5.0, 50.0, 300.0)
-        return (Parameter("hardening_percent_per_N", 0.0, 500.0, 10.0, linear=False, grid=grid),)
+    own = (Parameter("hardening_percent_per_N", 0.0, 500.0, 10.0, linear=False, grid=HARDENINGS),)
 
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return what hardening of several sizes does, times a share of each."""
-        return share_of_shape(self.parameters(place), "hardening_percent_per_N")
+        return share_of_shape(self.own, "hardening_percent_per_N")
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the screw that is missing."""
         force = lengths(at.through_place(place)[:, :3])
         stiffened = values["hardening_percent_per_N"] * force
-        return extra(at, place, -stiffened / (1.0 + stiffened)), None
+        return _extra(at, place, -stiffened / (1.0 + stiffened))
 
 
 class ThermalSoftening(Law):
@@ -52,25 +50,18 @@ class ThermalSoftening(Law):
     check = "repeat one loaded pose cold and warm"
     signals = ("temperature of the joint, or ambient, or its motor",)
     excited_by = "the same loads at temperatures at least 5 K apart"
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the growth of flexibility by the temperature, and how the part warms."""
-        return (Parameter("softening_percent_per_K", -5.0, 100.0, 1.0), *WARMTH)
+    own = (Parameter("softening_percent_per_K", -5.0, 100.0, 1.0), *WARMTH)
 
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return tangents, on a grid of how the part warms where no thermometer says it."""
-        return tangents(self.parameters(place), unused(place, signals))
+        return tangents(self.own, unused(place, signals))
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the further screw."""
         warm, state = warmth(at, place, values, state)
-        return extra(at, place, values["softening_percent_per_K"] * warm), state
-
-
-TIMES_S = (2.0, 8.0, 25.0, 90.0, 400.0)
-"""Time constants that are tried first."""
+        return _extra(at, place, values["softening_percent_per_K"] * warm), state
 
 
 class Creep(Law):
@@ -82,13 +73,10 @@ class Creep(Law):
     sentence = "the bushing of {place} goes on giving while a load is held"
     check = "hold a load for two minutes and watch the pose; unload and watch it come back"
     excited_by = "load steps held for a minute or more, and the recovery after them"
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the delayed part of the flexibility and its time constant."""
-        return (
-            Parameter("delayed_percent", 0.0, 500.0, 20.0),
-            Parameter("time_constant_s", 0.1, 1e5, 60.0, 60.0, linear=False, grid=TIMES_S),
-        )
+    own = (
+        Parameter("delayed_percent", 0.0, 500.0, 20.0),
+        Parameter("time_constant_s", 0.1, 1e5, 60.0, 60.0, linear=False, grid=TIMES_S),
+    )
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
@@ -98,3 +86,8 @@ class Creep(Law):
         slow, state = lagged(at.block.time, wrench, values["time_constant_s"], state)
         flexibility = at.parts.flexibility[ELASTIC.index(place)]
         return at.screw(place, values["delayed_percent"] * slow @ flexibility.T), state
+
+
+def _extra(at: Situation, place: str, fraction: Array) -> Contribution:
+    """Return fraction (n,) times the elastic screw of a bushing as a contribution."""
+    return Contribution(**{LIMB[place]: fraction[:, None] * at.elastic_screw(place)})

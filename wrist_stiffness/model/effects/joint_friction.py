@@ -32,29 +32,22 @@ class JointFriction(Law):
     check = "turn the joint by hand; clean it; compare an approach under load with a load at rest"
     excited_by = "approaches from both sides, and loads applied at rest against carried through"
     smooth = False
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return coefficient, preload, pre-sliding distance and flexibility of the bristle."""
-        return (
-            Parameter("coefficient", 0.0, 2.0, 0.1, linear=False, grid=(0.03, 0.15, 0.6)),
-            Parameter("preload_N", 0.0, 100.0, 1.0, linear=False),
-            Parameter("presliding_um", 0.01, 200.0, 5.0, mean=5.0, linear=False),
-            Parameter("bristle_um_per_N", 0.0, 1000.0, 10.0, linear=False, grid=(0.0, 30.0)),
-        )
+    own = (
+        Parameter("coefficient", 0.0, 2.0, 0.1, linear=False, grid=(0.03, 0.15, 0.6)),
+        Parameter("preload_N", 0.0, 100.0, 1.0, linear=False),
+        Parameter("presliding_um", 0.01, 200.0, 5.0, mean=5.0, linear=False),
+        Parameter("bristle_um_per_N", 0.0, 1000.0, 10.0, linear=False, grid=(0.0, 30.0)),
+    )
 
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return what friction of several sizes does, of short and soft bristles, times a share."""
-        fixed = {"preload_N": 0.0, "presliding_um": 3.0}
-        return share_of_shape(self.parameters(place), "coefficient", fixed)
+        return share_of_shape(self.own, "coefficient", {"preload_N": 0.0, "presliding_um": 3.0})
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any
     ) -> tuple[Contribution, Any]:
         """Return the friction force and torque; the state is the bristle's foot."""
-        coefficient, preload, presliding, bristle = (
-            values[key] for key in ("coefficient", "preload_N", "presliding_um", "bristle_um_per_N")
-        )
-        rubbing = Rubbing(place, coefficient, preload, presliding, bristle)
+        rubbing = Rubbing(place, *(values[each.key] for each in self.own))
         bristles = rubbing.bristles(at)
         force, feet = slip(bristles, bristles.moved[0] if state is None else state)
         push = rubbing.push(at, force)

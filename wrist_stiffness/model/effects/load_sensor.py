@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.law import Contribution, Law
-from wrist_stiffness.model.parameters import Parameter, symmetric
+from wrist_stiffness.model.parameters import (
+    FORCE,
+    MOMENT,
+    Parameter,
+    symmetric,
+    symmetric_vector,
+    vector,
+)
 from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.vector_keys import FORCE, MOMENT, symmetric_vector, vector
 
 
 class LoadBias(Law):
@@ -25,17 +30,12 @@ class LoadBias(Law):
     excited_by = "loads of several directions, and none"
     constant = True
     inexactness = 0.0
+    own = (*symmetric_vector(FORCE, 5.0, 0.1), *symmetric_vector(MOMENT, 100.0, 2.0))
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return what the sensor reads without load."""
-        return (*symmetric_vector(FORCE, 5.0, 0.1), *symmetric_vector(MOMENT, 100.0, 2.0))
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return true minus said."""
         bias = np.concatenate([vector(values, FORCE), vector(values, MOMENT)])
-        return Contribution(wrench=np.tile(-bias, (len(at.block), 1))), None
+        return Contribution(wrench=np.tile(-bias, (len(at.block), 1)))
 
 
 class LoadScale(Law):
@@ -48,16 +48,11 @@ class LoadScale(Law):
     check = "hang a reference weight on the platform: does the sensor say newtons, not kg or kN?"
     excited_by = "loads of several sizes beside a known weight"
     inexactness = 0.0
+    own = (Parameter("scale_percent", -50.0, 3000.0, 3.0, linear=False),)
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the excess."""
-        return (Parameter("scale_percent", -50.0, 3000.0, 3.0, linear=False),)
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return true minus said."""
-        return Contribution(wrench=self.load_share(values) * at.load), None
+        return Contribution(wrench=self.load_share(values) * at.load)
 
     def load_share(self, values: Mapping[str, float]) -> float:
         """Return the same as a share of what is said."""
@@ -97,19 +92,14 @@ class LoadCrossTalk(Law):
     check = "load one axis of the sensor at a time and read all six"
     excited_by = "forces and moments of every direction, one without the others"
     inexactness = 0.0
+    own = tuple(symmetric(key, *TALK_PRIOR[key.split("_", 3)[3]]) for key in TALK)
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the shares."""
-        return tuple(symmetric(key, *TALK_PRIOR[key.split("_", 3)[3]]) for key in TALK)
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return true minus said."""
         shares = np.zeros((6, 6))
         for key, entry in TALK.items():
             shares[entry] = values[key]
-        return Contribution(wrench=-at.load @ shares.T), None
+        return Contribution(wrench=-at.load @ shares.T)
 
 
 TURN_BASE, TURN_PLATFORM = "base_{}_mdeg", "platform_{}_mdeg"
@@ -125,21 +115,16 @@ class LoadMisalignment(Law):
     check = "hang a weight and compare the direction that the sensor says at several tilts"
     excited_by = "loads of several directions at several poses"
     inexactness = 0.0
+    own = (
+        *symmetric_vector(TURN_BASE, 1e4, 500.0),
+        *symmetric_vector(TURN_PLATFORM, 1e4, 500.0),
+    )
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the turns of a sensor in the base and of one on the platform."""
-        return (
-            *symmetric_vector(TURN_BASE, 1e4, 500.0),
-            *symmetric_vector(TURN_PLATFORM, 1e4, 500.0),
-        )
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return true minus said."""
         turn = vector(values, TURN_BASE) + at.body("platform") @ vector(values, TURN_PLATFORM)
         halves = cross(turn, at.load[:, :3]), cross(turn, at.load[:, 3:])
-        return Contribution(wrench=np.concatenate(halves, axis=1)), None
+        return Contribution(wrench=np.concatenate(halves, axis=1))
 
 
 LEVER_BASE, LEVER_PLATFORM = "base_{}_mm", "platform_{}_mm"
@@ -155,19 +140,14 @@ class LoadPoint(Law):
     check = "measure where the load touches; move it by a known distance and compare"
     excited_by = "forces of several directions at several poses"
     inexactness = 0.0
+    own = (
+        *symmetric_vector(LEVER_BASE, 1000.0, 2.0),
+        *symmetric_vector(LEVER_PLATFORM, 1000.0, 2.0),
+    )
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return both lever arms."""
-        return (
-            *symmetric_vector(LEVER_BASE, 1000.0, 2.0),
-            *symmetric_vector(LEVER_PLATFORM, 1000.0, 2.0),
-        )
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the missing moment."""
         lever = vector(values, LEVER_BASE) + at.body("platform") @ vector(values, LEVER_PLATFORM)
         wrench = np.zeros_like(at.load)
         wrench[:, 3:] = cross(lever, at.load[:, :3])
-        return Contribution(wrench=wrench), None
+        return Contribution(wrench=wrench)

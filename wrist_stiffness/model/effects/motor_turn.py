@@ -28,16 +28,11 @@ class EncoderOffset(Law):
     excited_by = "poses all over the workspace"
     constant = True
     inexactness = 0.0
+    own = (symmetric("offset_mdeg", 5000.0, 100.0),)
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the true angle minus the encoder's."""
-        return (symmetric("offset_mdeg", 5000.0, 100.0),)
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the turn."""
-        return at.motor_turn(place, np.full(len(at.block), values["offset_mdeg"])), None
+        return at.motor_turn(place, np.full(len(at.block), values["offset_mdeg"]))
 
 
 class EncoderEccentricity(Law):
@@ -50,25 +45,20 @@ class EncoderEccentricity(Law):
     check = "compare the encoder over a full turn with a polygon or an autocollimator"
     excited_by = "the whole travel of the motor"
     inexactness = 0.03
+    own = tuple(
+        symmetric(f"{wave}_{order}_mdeg", 5000.0, 50.0)
+        for order in (1, 2)
+        for wave in ("cos", "sin")
+    )
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return cosine and sine amplitudes of both orders."""
-        return tuple(
-            symmetric(f"{wave}_{order}_mdeg", 5000.0, 50.0)
-            for order in (1, 2)
-            for wave in ("cos", "sin")
-        )
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the turn."""
         angle = at.block.theta[:, MOTORS.index(place)]
         turn = np.zeros_like(angle)
         for order in (1, 2):
             turn += values[f"cos_{order}_mdeg"] * np.cos(order * angle)
             turn += values[f"sin_{order}_mdeg"] * np.sin(order * angle)
-        return at.motor_turn(place, turn), None
+        return at.motor_turn(place, turn)
 
 
 class Backlash(Law):
@@ -84,14 +74,11 @@ class Backlash(Law):
     sentence = "{place} has lost motion: its output lies behind on the side it came from"
     check = "approach one angle from both sides; feel the output's free play with the motor held"
     excited_by = "the same poses approached from both sides"
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the full width."""
-        return (Parameter("width_mdeg", 0.0, 5000.0, 20.0, linear=False),)
+    own = (Parameter("width_mdeg", 0.0, 5000.0, 20.0, linear=False),)
 
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return the column of a usual width: motions are longer than that."""
-        (width,) = self.parameters(place)
+        (width,) = self.own
         return at_usual_size(width, width.scale)
 
     def advance(
@@ -132,15 +119,11 @@ class TransmissionError(Law):
     check = "count the teeth: does the order fit a tooth mesh or a strain-wave generator?"
     excited_by = "slow sweeps of the motor, several samples within a wave"
     many_waves = True
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the amplitudes, the order, and how far they vary once per turn."""
-        waves = (symmetric(key, 5000.0, 10.0) for n in HARMONICS for key in amplitudes(n))
-        return (
-            *waves,
-            Parameter("order", 3.0, 500.0, 50.0, mean=10.0, linear=False, grid=ORDERS),
-            *(Parameter(key, -100.0, 100.0, 10.0, linear=False) for key in RUN_OUT),
-        )
+    own = (
+        *(symmetric(key, 5000.0, 10.0) for n in HARMONICS for key in amplitudes(n)),
+        Parameter("order", 3.0, 500.0, 50.0, mean=10.0, linear=False, grid=ORDERS),
+        *(Parameter(key, -100.0, 100.0, 10.0, linear=False) for key in RUN_OUT),
+    )
 
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return columns of the waves on a grid of orders; the run-out is found by a fit."""
@@ -151,11 +134,9 @@ class TransmissionError(Law):
             return np.stack([wave(p) for p in phases for wave in (np.cos, np.sin)], axis=-1)
 
         carried = Carried("encoder_offset", {"offset_mdeg": 1.0}, turns)
-        return replace(tangents(self.parameters(place), held=RUN_OUT), carried=carried)
+        return replace(tangents(self.own, held=RUN_OUT), carried=carried)
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the turn."""
         angle = at.block.theta[:, MOTORS.index(place)]
         turn = np.zeros_like(angle)
@@ -164,4 +145,4 @@ class TransmissionError(Law):
             phase = harmonic * values["order"] * angle
             turn += values[cosine] * np.cos(phase) + values[sine] * np.sin(phase)
         run_out = values[RUN_OUT[0]] * np.cos(angle) + values[RUN_OUT[1]] * np.sin(angle)
-        return at.motor_turn(place, (1.0 + run_out) * turn), None
+        return at.motor_turn(place, (1.0 + run_out) * turn)

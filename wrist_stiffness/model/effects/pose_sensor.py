@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.model.law import Contribution, Law
-from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.parameters import TWIST, symmetric_vector, twist, vector
 from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.vector_keys import symmetric_vector, twist, twist_parameters, vector
 
 
 class MeasurementFrame(Law):
@@ -24,16 +23,11 @@ class MeasurementFrame(Law):
     excited_by = "poses all over the workspace"
     constant = True
     inexactness = 0.0
+    own = TWIST
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the screw."""
-        return twist_parameters()
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the screw at every sample."""
-        return Contribution(sensor_left=np.tile(twist(values), (len(at.block), 1))), None
+        return Contribution(sensor_left=np.tile(twist(values), (len(at.block), 1)))
 
 
 class TargetMounting(Law):
@@ -47,16 +41,11 @@ class TargetMounting(Law):
     excited_by = "poses all over the workspace"
     constant = True
     inexactness = 0.0
+    own = TWIST
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the screw."""
-        return twist_parameters()
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the screw, turned with the platform."""
-        return Contribution(sensor_right=at.in_base("platform", twist(values))), None
+        return Contribution(sensor_right=at.in_base("platform", twist(values)))
 
 
 DRIFT_SHIFT, DRIFT_TURN = "shift_{}_um_per_h", "turn_{}_mdeg_per_h"
@@ -71,10 +60,7 @@ class Drift(Law):
     sentence = "the tracker wanders with time"
     check = "measure a target on the frame before, between and after"
     excited_by = "the same pose again and again over the whole session, or a target on the frame"
-
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the rates."""
-        return (*symmetric_vector(DRIFT_SHIFT, 1e4, 10.0), *symmetric_vector(DRIFT_TURN, 1e4, 5.0))
+    own = (*symmetric_vector(DRIFT_SHIFT, 1e4, 10.0), *symmetric_vector(DRIFT_TURN, 1e4, 5.0))
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

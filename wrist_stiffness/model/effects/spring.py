@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.at_point import bushing_centre, screw_from, wrench_at
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter, symmetric
-from wrist_stiffness.model.places import MOTOR_JOINT
+from wrist_stiffness.model.places import MOTOR_JOINT, bushing_centre, screw_from, wrench_at
 from wrist_stiffness.model.situation import Situation
 
 KEYS = tuple(f"{axis}_um_per_N" for axis in "xyz") + tuple(
     f"turn_{axis}_mdeg_per_Nm" for axis in "xyz"
 )
-
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 
@@ -31,8 +28,11 @@ COUPLINGS: dict[str, tuple[int, int]] = {
 """Places of the couplings in the symmetric compliance: those of a spring whose axes are turned
 against the body's, or whose centre is not the given point."""
 
+COUPLED = {"um_per_N": (1e3, 0.5), "mdeg_per_Nm": (1e5, 50.0), "um_per_Nm": (1e5, 20.0)}
+"""Bound and typical magnitude of a coupling by its unit."""
 
-class Spring(Law):
+
+class Spring(Law, ABC):
     """Compliances along and about x, y and z of the place's body at home, through a point.
 
     Couplings between them are zero for a spring that lies along these axes and through the point.
@@ -45,24 +45,20 @@ class Spring(Law):
     def centre(self, geometry: Geometry, place: str) -> Array:
         """Return the point at home, (3,) [m]."""
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return six compliances and their couplings."""
-        shift = (Parameter(key, 0.0, 1e3, 1.0) for key in KEYS[:3])
-        turn = (Parameter(key, 0.0, 1e5, 100.0) for key in KEYS[3:])
-        size = {"um_per_N": (1e3, 0.5), "mdeg_per_Nm": (1e5, 50.0), "um_per_Nm": (1e5, 20.0)}
-        coupled = (symmetric(key, *size["_".join(key.split("_")[-3:])]) for key in COUPLINGS)
-        return (*shift, *turn, *coupled)
+    own = (
+        *(Parameter(key, 0.0, 1e3, 1.0) for key in KEYS[:3]),
+        *(Parameter(key, 0.0, 1e5, 100.0) for key in KEYS[3:]),
+        *(symmetric(key, *COUPLED["_".join(key.split("_")[-3:])]) for key in COUPLINGS),
+    )
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the deflection under the wrench through the place."""
         point = self.centre(at.table.geometry, place)
         compliance = np.diag([values[key] for key in KEYS])
         for key, (i, j) in COUPLINGS.items():
             compliance[i, j] = compliance[j, i] = values.get(key, 0.0)
         local = wrench_at(point, at.at_home(place, at.through_place(place)))
-        return at.screw(place, screw_from(point, local @ compliance)), None
+        return at.screw(place, screw_from(point, local @ compliance))
 
 
 class MountCompliance(Spring):
@@ -108,3 +104,22 @@ class PlatformCompliance(Spring):
     def centre(self, geometry: Geometry, place: str) -> Array:
         """Return the plate's centre."""
         return geometry.platform.centre
+
+
+class DriveCompliance(Law):
+    """Windup of a drive: the output turns by compliance times the torque about the motor's axis."""
+
+    id = "drive_compliance"
+    stage = "reaction"
+    places = MOTORS
+    sentence = "the gearbox of {place} winds up under torque"
+    check = "lock the motor, load the link with a weight and a dial gauge, compare both directions"
+    excited_by = "loads with a torque about the motor axis, of both signs"
+    inexactness = 0.03
+    own = (Parameter("compliance_mdeg_per_Nm", 0.0, 1e6, 500.0),)
+
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+        """Return the turn."""
+        axis = at.table.geometry.axes[MOTOR_JOINT[place]]
+        torque = at.through_place(place)[:, 3:] @ axis
+        return at.motor_turn(place, values["compliance_mdeg_per_Nm"] * torque)

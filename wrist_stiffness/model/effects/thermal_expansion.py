@@ -9,10 +9,10 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.at_point import bushing_centre
 from wrist_stiffness.model.columns import Recipe, tangents
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.places import bushing_centre
 from wrist_stiffness.model.situation import Situation
 from wrist_stiffness.model.warmth import WARMTH, unused, warmth
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.compensation.intake import Frames
-from wrist_stiffness.compensation.static_transforms import (
+from wrist_stiffness.compensation.intake import (
+    Frames,
     StaticTransform,
     sensor_frames,
     transform_of,

@@ -1,1 +1,1 @@
-"""The laws of nature that a true wrist may hide, one file each; `catalogue` lists them."""
+"""The laws of nature that a true wrist may hide; `catalogue` lists them."""

@@ -12,17 +12,26 @@ from wrist_stiffness.mechanism.vectors import unit
 from wrist_stiffness.simulation.effect_entry import Draw, effect
 from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Law
 from wrist_stiffness.simulation.makers import spring
-from wrist_stiffness.simulation.strangers.motion import OilFilm, Resonance, SpinningTool
-from wrist_stiffness.simulation.strangers.places import CableStop, Dent, WornSector
-from wrist_stiffness.simulation.strangers.sensors import OverloadRing, PrismIncidence
-from wrist_stiffness.simulation.strangers.slow import (
+from wrist_stiffness.simulation.strangers.motion import (
     FloorTilt,
     LooseningScrew,
+    OilFilm,
+    Resonance,
+    SpinningTool,
     SqueezeFilm,
     Swelling,
     ThermalBow,
 )
-from wrist_stiffness.simulation.strangers.steps import HeadChange, LooseSeat, PlasticSet
+from wrist_stiffness.simulation.strangers.places import (
+    CableStop,
+    Dent,
+    HeadChange,
+    LooseSeat,
+    OverloadRing,
+    PlasticSet,
+    PrismIncidence,
+    WornSector,
+)
 
 
 # A tool that rings more than it moves.

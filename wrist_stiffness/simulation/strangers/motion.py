@@ -1,15 +1,29 @@
-"""Strangers that come with motion: a tool that rings or spins, a pin that floats on its oil."""
+"""Strangers of motion and time.
+
+A tool rings or spins, a pin floats on its oil or sinks in it; something bows, sways, swells or
+works loose.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.vectors import cross, dot
+from wrist_stiffness.mechanism.vectors import block_diagonal, cross, dot
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.law import JOINED, Law, at_component
+from wrist_stiffness.simulation.laws.joint_friction import joint_turn
+from wrist_stiffness.simulation.laws.law import (
+    JOINED,
+    Bending,
+    Flowing,
+    Law,
+    at_component,
+    no_screws,
+)
 from wrist_stiffness.simulation.seat import Seat
 
 
@@ -110,3 +124,118 @@ class SpinningTool(Law):
         self._past = float(block.time_s[-1]), now[-1]
         rate = np.divide(change, steps, out=np.zeros_like(change), where=steps > 0.0)
         return np.concatenate([np.zeros_like(rate), -rate], axis=-1)
+
+
+@dataclass(frozen=True)
+class ThermalBow(Law):
+    """The frame bows by the square of the difference in temperature between its two motors."""
+
+    twist_per_kelvin: Array  # (6,), of the platform at a difference of 1 K [m, rad]
+
+    def twist(self, block: Block, state: Equilibrium) -> Array:
+        """Move the platform with the frame."""
+        kelvin = block.temperature_of("motor_1") - block.temperature_of("motor_2")
+        return (kelvin * np.abs(kelvin))[:, None] * self.twist_per_kelvin
+
+
+@dataclass(frozen=True)
+class FloorTilt(Law):
+    """The carrier sways: the platform's weight has a direction that wanders."""
+
+    weight: float  # of platform and tool [N]
+    place: Array  # (3,), centre of gravity in U [m]
+    sway: Array  # (2, 3), two rotation vectors of the sway [rad]
+    periods_s: Array  # (2,) [s]
+
+    def wrench(self, block: Block) -> Array:
+        """Return the change of the weight."""
+        waves = np.sin(2.0 * np.pi * block.time_s[:, None] / self.periods_s)
+        down = np.array([0.0, 0.0, -self.weight])
+        force = cross(waves @ self.sway, np.broadcast_to(down, (len(waves), 3)))
+        at = block.configuration.platform @ self.place
+        return np.concatenate([force, cross(at, force)], axis=-1)
+
+
+@dataclass(frozen=True)
+class Swelling(Law):
+    """A bushing swells and dries with a humidity that nobody records."""
+
+    joint: str
+    screw: Array  # (6,), at O with the wrist at home at 1 [m, rad]
+    # `periods_s`, `phases`: (k,), of the humidity's waves [s], [rad]
+    periods_s: Array
+    phases: Array
+
+    def screws(self, block: Block) -> Array:
+        """Follow the humidity."""
+        angle = 2.0 * np.pi * block.time_s[:, None] / self.periods_s + self.phases
+        wet = np.sin(angle).mean(axis=-1)
+        turned = block_diagonal(block.rotation(self.joint)) @ self.screw
+        return at_component(block, self.joint, wet[:, None] * turned)
+
+
+class LooseningScrew(Bending):
+    """A link's clamp screw works loose: its end gets softer with all that the motors have moved.
+
+    The gears shake it, and it never tightens again.
+
+    `flexibility` (6, 6): of the open clamp, at O with the wrist at home [m/N, rad/N, rad/(N m)];
+    `path`: sum of both motors' motion after which 63 % of it are there [rad].
+    """
+
+    def __init__(self, link: str, flexibility: Array, path: float) -> None:
+        self.component, self._flexibility, self._path = link, flexibility, path
+        self._past: tuple[float, Array] | None = None
+        self._loose = np.zeros(0), np.zeros(0)
+
+    def screws(self, block: Block) -> Array:
+        """Count what the motors move."""
+        theta = block.configuration.theta
+        so_far, past = self._past or (0.0, theta[0])
+        moved = so_far + np.cumsum(np.abs(np.diff(theta, axis=0, prepend=past[None])).sum(axis=1))
+        self._past = float(moved[-1]), theta[-1]
+        self._loose = block.time_s, -np.expm1(-moved / self._path)
+        return no_screws(block)
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Give way to the wrench, as loose as the screw is by now."""
+        turn = block_diagonal(block.rotation(self.component))
+        loose = np.interp(block.time_s, *self._loose)[:, None, None]
+        soft = loose * (turn @ self._flexibility @ np.swapaxes(turn, -1, -2))
+        return (soft @ wrench[..., None])[..., 0], soft
+
+
+class SqueezeFilm(Flowing):
+    """A passive joint's pin sinks along its radial force while at rest; turning centres it again.
+
+    The force squeezes the lubricant out of the gap, the faster the larger it is.
+
+    `joint`: passive joint; `gap`: radial gap, the farthest that the pin sinks [m]; `time_s`: time
+    constant of sinking under 1 N [s]; `turn`: turn of the joint that draws 63 % of the lubricant in
+    again [rad].
+    """
+
+    def __init__(self, joint: str, seat: Seat, gap: float, time_s: float, turn: float) -> None:
+        self.component, self._seat, self._gap = joint, seat, gap
+        self._time_s, self._turn = time_s, turn
+        self._past: tuple[float, float, Array] | None = None
+
+    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
+        """Sink by time and force, rise by turn."""
+        to_origin = self._seat.to_origin(block.rotation(self.component))
+        across = np.eye(3) - np.outer(self._seat.axis, self._seat.axis)
+        force = np.einsum("nji,nj->ni", to_origin, wrench)[:, :3] @ across
+        size = np.sqrt(np.sum(force * force, axis=-1))
+        wall = self._gap * force / np.maximum(size, 1e-12)[:, None]
+        turn = joint_turn(block, self.component, self._seat.axis)
+        # It was turned before the start.
+        before, angle, sunk = self._past or (block.time_s[0], turn[0], np.zeros(3))
+        out = np.zeros_like(wrench)
+        for i, now in enumerate(block.time_s):
+            sunk = sunk * np.exp(-abs(turn[i] - angle) / self._turn)
+            sunk = wall[i] + (sunk - wall[i]) * np.exp(-size[i] * (now - before) / self._time_s)
+            before, angle = now, turn[i]
+            out[i, :3] = sunk
+        if remember:
+            self._past = float(before), float(angle), sunk
+        return np.einsum("nij,nj->ni", to_origin, out)

@@ -1,20 +1,41 @@
-"""`joint_clearance`: the pin leans on the bore at both ends as the reactions there push it."""
+"""`joint_clearance`, `flange_contact`: the play of a joint."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.laws.law import Bending
+from wrist_stiffness.simulation.laws.law import Bending, Law
 from wrist_stiffness.simulation.seat import Seat
 
 
 @dataclass(frozen=True)
+class FlangeGap(Law):
+    """Another axial gap at the flanges of a passive joint."""
+
+    joint: str  # passive joint with flanges
+    change: float  # of the gap [m]; negative presses the flange on
+
+    def parts(self, parts: ElasticComponents) -> ElasticComponents:
+        """Move the flange.
+
+        Raises `InputError` if the joint has no flange in this table.
+        """
+        if self.joint not in parts.contact:
+            raise InputError(f"flange_contact: {self.joint} has no flange in this table")
+        flange = parts.contact[self.joint]
+        contact = dict(parts.contact)
+        contact[self.joint] = replace(flange, gap=flange.gap + self.change)
+        return replace(parts, contact=contact)
+
+
+@dataclass(frozen=True)
 class JointClearance(Bending):
-    """Play of a pin in its bore: contact equilibrium of the two ends, each on its own.
+    """Play of a pin in its bore: it leans on it at both ends as the reactions there push it.
 
     An end at which the reaction F pushes lies at the radial distance (c/2) g(|F|/F0): it has
     crossed the gap when F is well above the little force F0 that squeezes the contact shut.

@@ -1,4 +1,4 @@
-"""Play between pin and sleeve of a bushing."""
+"""The play of a joint: between pin and sleeve, and between flange and hub."""
 
 from __future__ import annotations
 
@@ -6,13 +6,43 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from wrist_stiffness.mechanism.components import JOINTS
-from wrist_stiffness.model.columns import Recipe, at_usual_size
+import numpy as np
+
+from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
+from wrist_stiffness.model.columns import Recipe, at_usual_size, share_of_shape
 from wrist_stiffness.model.law import NOTHING, Contribution, Law
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.pin_play import SMALL_FORCE
 from wrist_stiffness.model.pin_rest import Pin
 from wrist_stiffness.model.situation import Situation
+
+GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
+"""Changes of a gap that are tried first, of both signs."""
+
+
+class FlangeContact(Law):
+    """All gaps of a joint's flanges are wider by the same amount."""
+
+    id = "flange_contact"
+    stage = "geometry"
+    places = PASSIVE_JOINTS
+    sentence = "the axial gap of {place} is not as modelled, so its flange touches later or sooner"
+    check = "measure the axial play of the joint with a feeler gauge"
+    excited_by = "axial forces of both signs at the joint"
+    constant = True
+    smooth = False
+    inexactness = 0.03
+    own = (Parameter("gap_um", -1000.0, 1000.0, 30.0, linear=False, grid=GAPS_UM),)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return what gaps of several sizes do, times a share of each."""
+        return share_of_shape(self.own, "gap_um")
+
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+        """Return the opening of the joint's sectors."""
+        own = at.parts.sectors.component == ELASTIC.index(place)
+        gap = np.where(own, values["gap_um"], 0.0)
+        return Contribution(gap=np.tile(gap, (len(at.block), 1)))
 
 
 class JointClearance(Law):
@@ -35,6 +65,7 @@ class JointClearance(Law):
     check = "push and pull the joint across its axis with a dial gauge; swap the bushing"
     excited_by = "loads of opposite directions, so that the bearing force changes sides"
     smooth = False
+    own = (Parameter("clearance_um", 0.0, 2000.0, 20.0),)
 
     def __init__(
         self, small_force: float = SMALL_FORCE, sharp: JointClearance | None = None
@@ -45,14 +76,9 @@ class JointClearance(Law):
         """Return play in which a pin goes from wall to wall little by little."""
         return self._sharp if force is None else _rounded(self._sharp, force)
 
-    def parameters(self, place: str) -> tuple[Parameter, ...]:
-        """Return the diametral clearance."""
-        return (Parameter("clearance_um", 0.0, 2000.0, 20.0),)
-
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return the column of a small clearance, in which no flange stands in the way."""
-        (clearance,) = self.parameters(place)
-        return at_usual_size(clearance, 5.0)
+        return at_usual_size(self.own[0], 5.0)
 
     def advance(
         self, at: Situation, place: str, values: Mapping[str, float], state: Any

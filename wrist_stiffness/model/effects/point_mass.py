@@ -1,0 +1,191 @@
+"""Masses that are not the modelled ones: their weight, and their inertia in fast motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from wrist_stiffness.mechanism.components import ELASTIC, LINKS
+from wrist_stiffness.mechanism.statics import component_rotations, weight_wrench
+from wrist_stiffness.mechanism.vectors import cross
+from wrist_stiffness.model.columns import Column, Factor, Recipe, Shape, Values, factor
+from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.parameters import Parameter, vector
+from wrist_stiffness.model.situation import Situation
+
+PLACE = {axis: f"{axis}_mm" for axis in "xyz"}
+
+TILTS = ("tilt_x_mdeg", "tilt_y_mdeg")
+
+TRIAL_G, TRIAL_MM, TRIAL_MDEG = 10.0, 10.0, 100.0
+"""Of the trials for columns; the effect is linear in the mass, its first moment and small tilts."""
+
+AT_PLATE = {"x_mm": 0.0, "y_mm": 0.0, "z_mm": -12.0, "inertia_gmm2": 0.0}
+"""About where the shipped wrist has its plate: from there a moving mass is sought."""
+
+
+def mass_columns(
+    parameters: Sequence[Parameter], mass_g: float, at: Values, arm_mm: float
+) -> tuple[Column, ...]:
+    """Return columns of a mass and of its first moment, mass times place, along x, y and z.
+
+    `parameters`: among them `mass_g`, `x_mm`, `y_mm` and `z_mm`.  `at`: values of all other
+    parameters in the trials; the first moment counts from its place.  `arm_mm`: by how much the
+    trials move the mass.
+    """
+    own = {each.key: each for each in parameters}
+    heavy = at | {"mass_g": mass_g}
+    return (
+        Column(factor(own["mass_g"]), heavy, mass_g),
+        *(
+            Column(
+                Factor(_moment(axis), plausible=own["mass_g"].scale * own[key].scale),
+                heavy | {key: at[key] + arm_mm},
+                mass_g * arm_mm,
+                heavy,
+            )
+            for axis, key in PLACE.items()
+        ),
+    )
+
+
+def place_of(
+    parameters: Sequence[Parameter], found: Mapping[str, float], mass_g: float, at: Values
+) -> Values:
+    """Return where a mass is, within the bounds, by the factors of `mass_columns`."""
+    own = {each.key: each for each in parameters}
+    return {
+        key: own[key].within(at[key] + found[_moment(axis)] / mass_g) for axis, key in PLACE.items()
+    }
+
+
+def _moment(axis: str) -> str:
+    return f"moment_{axis}_gmm"
+
+
+class Gravity(Law):
+    """A mass more (or less) at a centre of gravity fixed in the body.
+
+    A mass on a link pulls half at each bore.  At the platform also the mounting tilt, which turns
+    gravity in F and so every weight.
+    """
+
+    id = "gravity"
+    stage = "load"
+    places = ("platform", *LINKS)
+    sentence = "{place} carries a weight that is not modelled, or the wrist is mounted tilted"
+    check = "weigh payload and fittings; lay a level on the base"
+    excited_by = "unloaded poses all over the workspace"
+    smooth = False
+    inexactness = 0.0
+
+    def parameters(self, place: str) -> tuple[Parameter, ...]:
+        """Return mass and centre of gravity in the body at home, and the tilt of the base."""
+        centre = tuple(Parameter(key, -500.0, 500.0, 20.0, linear=False) for key in PLACE.values())
+        mass = Parameter("mass_g", -500.0, 20000.0, 30.0, linear=False)
+        if place != "platform":
+            return (mass, *centre)
+        tilt = (Parameter(key, -2e5, 2e5, 1000.0, linear=False) for key in TILTS)
+        return (mass, *centre, *tilt)
+
+    def sized_by(self, place: str) -> tuple[str, ...]:
+        """Return all but the tilt: a heavy payload does not turn the wrist."""
+        return tuple(each.key for each in self.parameters(place) if each.key not in TILTS)
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return columns of the mass and its first moment, and of the tilt of the base."""
+        parameters = self.parameters(place)
+        nothing = {each.key: 0.0 for each in parameters}
+        columns = mass_columns(parameters, TRIAL_G, nothing, TRIAL_MM)
+        tilts = [each for each in parameters if each.key in TILTS]
+        columns += tuple(
+            Column(factor(each), nothing | {each.key: TRIAL_MDEG}, TRIAL_MDEG) for each in tilts
+        )
+
+        def start(found: Mapping[str, float], at: Shape) -> Values:
+            mass = found["mass_g"]
+            centre = place_of(parameters, found, mass or 1.0, nothing)
+            return centre | {"mass_g": mass} | {each.key: found[each.key] for each in tilts}
+
+        return Recipe((), lambda at: columns, start)
+
+    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+        """Return the weight as a wrench, and the change of all weights by the tilt."""
+        modelled = at.table.geometry.gravity
+        tilt = [values.get(key, 0.0) for key in TILTS]
+        gravity = Rotation.from_rotvec([*tilt, 0.0]).apply(modelled)
+        weight = np.empty((len(at.block), 6))
+        weight[:, :3] = values["mass_g"] * gravity
+        weight[:, 3:] = cross(at.body(place) @ vector(values, "{}_mm"), weight[:, :3])
+        if place == "platform":
+            added = Contribution(wrench=weight)
+            return added + tilted(at, gravity - modelled) if any(tilt) else added
+        ends = np.zeros((len(weight), len(ELASTIC), 6))
+        ends[:, ELASTIC.index(place)] = 0.5 * weight
+        return Contribution(through=at.influence.through_components(ends, ends))
+
+
+def tilted(at: Situation, change: np.ndarray) -> Contribution:
+    """Return what a change of gravity (3,) in F [m/s^2] does to the weights of all parts."""
+    sectors = at.parts.sectors
+    turn = component_rotations(at.configuration).take(sectors.component, axis=-3)
+    return Contribution(
+        through=weight_wrench(at.configuration, at.parts, change, at.influence),
+        gap=np.einsum("mi,nmji,j->nm", sectors.weight_approach, turn, change),
+    )
+
+
+class Inertia(Law):
+    """-m a of a mass at a centre of gravity in U, and -I alpha of a round inertia about it.
+
+    The acceleration is the backward difference of the rigid platform's velocity.
+    """
+
+    id = "inertia"
+    stage = "load"
+    places = ("platform",)
+    sentence = "the platform's mass resists fast motion"
+    check = "repeat the motion at half the speed: the error falls to a quarter"
+    signals = ("motor speeds, or a dense recording",)
+    excited_by = "the same motion at several speeds"
+    inexactness = 0.03
+    own = (
+        Parameter("mass_g", 0.0, 5000.0, 50.0, linear=False),
+        *(Parameter(key, -200.0, 200.0, 20.0, linear=False) for key in PLACE.values()),
+        Parameter("inertia_gmm2", 0.0, 1e8, 1e4, linear=False),
+    )
+
+    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
+        """Return columns of a mass moving at the plate, of its place, and of a round inertia."""
+        mass, *_, inertia = self.own
+        trial = AT_PLATE | {"mass_g": 0.0, "inertia_gmm2": inertia.scale}
+        columns = (
+            *mass_columns(self.own, mass.scale, AT_PLATE, 1.0),
+            Column(factor(inertia), trial, inertia.scale),
+        )
+
+        def start(found: Mapping[str, float], at: Shape) -> Values:
+            mass = max(found["mass_g"], 1.0)
+            centre = place_of(self.own, found, mass, AT_PLATE)
+            return centre | {"mass_g": mass, "inertia_gmm2": max(found["inertia_gmm2"], 0.0)}
+
+        return Recipe((), lambda at: columns, start)
+
+    def advance(
+        self, at: Situation, place: str, values: Mapping[str, float], state: Any
+    ) -> tuple[Contribution, Any]:
+        """Return the wrench; the state is the last sample's time and velocity."""
+        omega = (at.jacobian @ at.speed[..., None])[..., 0]
+        time, before = state if state else (at.block.time[0], omega[0])
+        interval = np.diff(at.block.time, prepend=time)[:, None]
+        step = np.diff(omega, axis=0, prepend=before[None])
+        alpha = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
+        arm = at.body("platform") @ vector(values, "{}_mm")
+        acceleration = cross(alpha, arm) + cross(omega, cross(omega, arm))
+        wrench = np.empty((len(omega), 6))
+        wrench[:, :3] = -values["mass_g"] * acceleration
+        wrench[:, 3:] = cross(arm, wrench[:, :3]) - values["inertia_gmm2"] * alpha
+        return Contribution(wrench=wrench), (at.block.time[-1], omega[-1])
