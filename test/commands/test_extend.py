@@ -22,7 +22,8 @@ from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import file_sha256, load_model
-from wrist_stiffness.model.registry import effect_named, python_laws
+from wrist_stiffness.model.python_laws import python_laws
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.report.fit_lines import extension_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file

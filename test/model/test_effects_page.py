@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.model.registry import catalogue, python_laws
+from wrist_stiffness.model.python_laws import python_laws
+from wrist_stiffness.model.registry import catalogue
 from wrist_stiffness.shipped import shipped_file
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"

@@ -17,7 +17,8 @@ from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
 from wrist_stiffness.model.parameters import Estimate
-from wrist_stiffness.model.registry import ALLOWED, catalogue, find_law, python_laws
+from wrist_stiffness.model.python_laws import ALLOWED, python_laws
+from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.shipped import shipped_file
 
 TABLE = str(shipped_file("precomputed/palmieri2015.npz"))

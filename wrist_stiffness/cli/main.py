@@ -39,7 +39,7 @@ from wrist_stiffness.cli.parser import (
 )
 from wrist_stiffness.cli.progress import bars_ended
 from wrist_stiffness.errors import InputError, WristError
-from wrist_stiffness.model.registry import python_laws
+from wrist_stiffness.model.python_laws import python_laws
 
 EXIT_TERMINATED = 128 + signal.SIGTERM
 

@@ -31,7 +31,8 @@ from wrist_stiffness.model.joint_uncertainty import KEYS, JointUncertainty
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.parameters import Estimate
-from wrist_stiffness.model.registry import find_law, law_from_file, require_python_laws
+from wrist_stiffness.model.python_laws import require_python_laws
+from wrist_stiffness.model.registry import find_law, law_from_file
 
 SCHEMA = 1
 FORMULA, PYTHON = "formula", "python"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module, metadata, util
 from pathlib import Path
@@ -180,30 +179,3 @@ def law_from_file(reference: str, folder: Path) -> Law:
     law = law_of(getattr(module, name), reference)
     law.file = path
     return law
-
-
-ALLOWED = "WRIST_STIFFNESS_ALLOW_PYTHON_LAWS"
-"""Environment variable: what a command may run, the processes that it starts may run."""
-
-
-@contextmanager
-def python_laws(allowed: bool) -> Iterator[None]:
-    """Let models name Python files as laws, or leave it as it was."""
-    before = os.environ.get(ALLOWED, "")
-    os.environ[ALLOWED] = "1" if allowed else before
-    try:
-        yield
-    finally:
-        os.environ[ALLOWED] = before
-
-
-def require_python_laws(reference: str) -> None:
-    """Refuse the Python file that a model names, unless somebody said that it may be run.
-
-    Raises `InputError` with how to say so.
-    """
-    if os.environ.get(ALLOWED) != "1":
-        raise InputError(
-            f"{reference} is a program, and none is run unasked: if you trust it, "
-            "allow_python_laws (a node's parameter) or --allow-python-laws (a command's option)"
-        )

@@ -12,7 +12,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.error_model import ErrorModel, Load
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.model.registry import python_laws
+from wrist_stiffness.model.python_laws import python_laws
 
 LOOK_EVERY_S = 0.1
 
