@@ -188,7 +188,8 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
     strange = [each for each in lines if each["truth"] and "nothing" in each]
     sound = [each for each in lines if not each["truth"]]
     rows = ["| effect, size | removed of what the process removes | component | law |", "|-|-|-|-|"]
-    seen, predicted = [], []
+    seen, blind, predicted, predicted_blind = [], [], [], []
+    others = {law for law, _, _ in one_each(BLIND)}
     for each in strange:
         beyond = 3.0 * np.sqrt(2.0 * each["numbers"])
         gains = {name: each["nothing"] - each[name] for name in ("law", "process")}
@@ -196,24 +197,48 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
         right["a law"] = bool(each["laws"])
         above = each["nothing"] - each["numbers"]
         if above > beyond:
-            seen.append(
-                right | {"half of the error above noise removed": gains["law"] >= above / 2}
-            )
+            halved = {"half of the error above noise removed": gains["law"] >= above / 2}
+            seen.append(right | halved)
+            if each["truth"][0] in others:
+                blind.append(right | halved)
         told = "the process removes nothing"
         if gains["process"] > beyond:
             share = gains["law"] / gains["process"]
-            predicted.append(right | {"half of what the process removes": share >= 0.5})
+            halved = {"half of what the process removes": share >= 0.5}
+            predicted.append(right | halved)
+            if each["truth"][0] in others:
+                predicted_blind.append(right | halved)
             told = f"{100.0 * share:.0f} %"
         where = next((told for key, told in WHERE.items() if each[key]), "-")
         laws = "; ".join(each["laws"]) or "none"
         rows.append(f"| {'@'.join(each['truth'])}, {each['size']:g} | {told} | {where} | {laws} |")
-    for whose, kept in (("above the noise", seen), ("predicted by the process", predicted)):
+    known = (
+        ("above the noise", seen),
+        ("by another author", blind),
+        ("predicted by the process", predicted),
+        ("by another author predicted by the process", predicted_blind),
+    )
+    for whose, kept in known:
         for what in kept[0] if kept else ():
             hits = sum(bool(each[what]) for each in kept)
             rows.append(_rate(f"strangers {whose}: {what.replace('_', ' ')}", hits, len(kept)))
     rows.append(_rate("sound wrists: no law", sum(not x["laws"] for x in sound), len(sound)))
-    times = [each["cpu_s"] for each in lines if "cpu_s" in each]
-    rows.append(f"processor time of one search: median {np.median(times):.1f} s")
+    for low, high in ((0.95, 1.01), (0.3, 0.95), (0.0, 0.3)):
+        told = [each for each in strange if each["laws"] and low <= each["probability"] < high]
+        hits = sum(each["right_sentence"] for each in told)
+        rows.append(
+            _rate(
+                f"told with {100 * low:.0f} to {100 * min(high, 1.0):.0f} %: right sentence",
+                hits,
+                len(told),
+            )
+        )
+    for whose, kept in (("strangers", strange), ("sound wrists", sound)):
+        times = [each["cpu_s"] for each in kept if "cpu_s" in each] or [0.0]
+        rows.append(
+            f"processor time of one search, {whose}: median {np.median(times):.1f} s, "
+            f"longest {max(times):.1f} s"
+        )
     return "\n".join(rows)
 
 

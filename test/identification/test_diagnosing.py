@@ -219,3 +219,22 @@ def test_a_drive_that_is_stiffer_than_stiff_is_not_asked(model, in_the_cell, sig
     assert asked.evidence.log == pytest.approx(fit.evidence.log, abs=1.0)
     assert asked.whole.columns[:, place].any()
     assert np.sqrt(asked.covariance[place, place]) * asked.base.problem.unknowns[place].step < 800.0
+
+
+@pytest.mark.slow
+def test_a_quick_fit_tells_what_slopes_cannot(model, in_the_cell):
+    """Flanges close under a weight: about the wrist without it the slopes say far too little."""
+    hidden = HiddenEffect("gravity", "platform", "mass", 0.17, 5)
+    units = as_units(model, measured(in_the_cell, model, (hidden,)))
+    problem = WristProblem(model, (units,))
+    fit = problem.begin()
+    (trial,) = (each for each in problem.trials(fit) if each.name == "gravity@platform")
+    (first,) = ranked(fit.evidence, [trial])
+    near, whole = problem.nearly(fit, first), problem.added(fit, first)
+    gained, nearly = (each.evidence.log - fit.evidence.log for each in (whole, near))
+    short = gained - first.gain
+    assert short > 30.0
+    assert abs(gained - nearly) < short / 3.0
+    # That is what makes it quick: the base's columns are those without the weight.
+    of_base = near.base.columns[:, :, near.base.of_base]
+    np.testing.assert_array_equal(of_base, fit.base.columns)

@@ -38,7 +38,8 @@ COOLING = 0.05
 """Least ratio of the variances of two steps: believed too early, the data close a wrong flange."""
 
 ENOUGH, NEARLY = 3e-3, 3e-2
-"""Relative fall of the sum of squares below which the fit has converged, and with rounded walls."""
+"""Relative fall of the sum of squares below which a fit has converged; the second of a quick fit,
+and with rounded walls."""
 
 SMALLEST_STEP = 1.0 / 16.0
 
@@ -334,7 +335,8 @@ def _descended(
 
     Columns of the `usual` first effects, the base, cost by far the most and hardly change about a
     fit: those of `near` (u, 6, p), where there is one, serve until they lead no further.  The end
-    is after a step with all columns of the very point where it began that gains next to nothing.
+    is after a step with all columns of the very point where it began that gains next to nothing;
+    where these are `kept`, it is where they lead no further.
     """
     lower, upper = problem.bounds
     weights = problem.weights

@@ -37,8 +37,8 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import si_factor
 
-WHOLE = 6
-"""Leading laws that are fitted whole."""
+MOST_FITTED = 6
+"""Leading laws that are fitted."""
 
 UNLIKE = 2.0
 """Times by which a fit may reach further beyond its first order than another one (assumed)."""
@@ -217,20 +217,20 @@ class _Search:
         return _distinct(self._settled(sorted(found, key=_log, reverse=True), fit))
 
     def _settled(self, found: list[_Judged], near: WristFit) -> list[_Judged]:
-        """Return laws, the most probable first, fitted whole where that may change which it is."""
+        """Return laws, the most probable first, fitted where that may change which it is."""
         best, reach = near.evidence.log, 0.0
-        for number, first in enumerate(found[:WHOLE]):
-            # Whole fits reach further than their first order, some more than others.
+        for number, first in enumerate(found[:MOST_FITTED]):
+            # Fits reach further than their first order, some more than others.
             if first.log + UNLIKE * reach < best - NEGLIGIBLE:
                 break
-            while (again := self._whole(found[number], near)).log > found[number].log + NEGLIGIBLE:
+            while (again := self._fitted(found[number], near)).log > found[number].log + NEGLIGIBLE:
                 found[number] = again
             reach = max(reach, found[number].log - first.log)
             best = max(best, found[number].log)
         return sorted(found, key=_log, reverse=True)
 
-    def _whole(self, first: _Judged, near: WristFit) -> _Judged:
-        """Return a law judged where a whole fit ends with it, if that is more probable.
+    def _fitted(self, first: _Judged, near: WristFit) -> _Judged:
+        """Return a law judged where a fit ends with it, if that is more probable.
 
         Set-up and tolerances have given way to what is missing: beside the right law they find
         back, beside another one they cannot.
