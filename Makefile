@@ -38,7 +38,7 @@ lint: $(READY)
 	$(RUN) mypy
 
 docs: $(READY)
-	NO_MKDOCS_2_WARNING=1 $(RUN) mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(RUN) mkdocs build
 
 bench: $(READY)
 	$(VENV)/bin/python bench/page.py $(BENCH_ARGS)

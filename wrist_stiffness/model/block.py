@@ -92,7 +92,7 @@ class Block:
 class Load(NamedTuple):
     """Wrench on the platform at O, fixed in F or turning with the platform.
 
-    Parameters
+    Attributes
     ----------
     wrench : (6,) float
         Force and moment at O [N, N m].
