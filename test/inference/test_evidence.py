@@ -12,8 +12,15 @@ from scipy.stats import multivariate_normal, multivariate_t
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.evidence import TAIL, Evidence, log_size_prior
 from wrist_stiffness.inference.point import Background, Group, Point
+from wrist_stiffness.inference.possible import Possible
 
 ROWS = 14
+
+ABOVE = Possible(np.zeros(2), np.full(2, np.inf))
+WIDE = Possible(
+    np.array([0.0, -np.inf]), np.full(2, np.inf), lambda z: np.abs(z[:, 0]) > np.abs(z[:, 1])
+)
+"""Two quarters of the plane."""
 
 
 def linear(rng, effects=None, columns=2, z=None):
@@ -126,14 +133,39 @@ def test_what_cannot_be_explains_nothing(rng):
     left = columns @ np.array([5.0, -5.0]) + rng.normal(size=ROWS)
     point = Point(left, empty, np.zeros(0), np.zeros(0), {}, empty)
     at = Evidence(point, Background((), 0.2), np.zeros(0), 1.0)
-    either = -np.full(2, np.inf), np.full(2, np.inf)
+    most = np.full(2, np.inf)
     (free, _), (held, z) = at.gains(
-        [-columns, -columns], [either, (np.array([-np.inf, 0.0]), either[1])]
+        [-columns, -columns], [Possible(-most, most), Possible(np.array([-np.inf, 0.0]), most)]
     )
     ((alone, first),) = at.gains([-columns[:, :1]])
     assert free > held + 10.0
     assert held == pytest.approx(alone)
     assert z.tolist() == pytest.approx([*first, 0.0])
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("possible", [ABOVE, WIDE], ids=["each above 0", "first beyond second"])
+def test_the_evidence_is_the_integral_over_what_is_possible(rng, size, possible):
+    """Over a prior that is nothing elsewhere, and as much larger there."""
+    columns, empty = rng.normal(size=(ROWS, 2)), np.zeros((ROWS, 0))
+    left = columns @ np.array([size, 0.3 * size]) + rng.normal(size=ROWS)
+    at = Point(left, -columns, np.zeros(2), np.ones(2), {"a": np.arange(2)}, empty, linear=True)
+    at = at.moved(np.linalg.lstsq(columns, left)[0])
+    ground, one = Background((), 0.2), np.zeros(0)
+    without = Evidence(Point(left, empty, np.zeros(0), np.zeros(0), {}, empty), ground, one, 1.0)
+    grid = np.linspace(-12.0, 12.0, 1201)
+    z = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+    within = ((z >= possible.lower) & (z <= possible.upper)).all(axis=1)
+    if possible.together is not None:
+        within &= possible.together(z)
+    prior = multivariate_t(np.zeros(2), np.eye(2), TAIL).pdf(z) * within
+    # A quarter of the plane each.
+    prior *= 4.0 * (grid[1] - grid[0]) ** 2
+    change = np.sum((left - z @ columns.T) ** 2, axis=1) - np.sum(left**2)
+    exact = np.log(np.sum(np.exp(-0.5 * change) * prior))
+    bounded = Evidence(replace(at, possible={"a": possible}), ground, one, 1.0)
+    assert bounded.log - without.log == pytest.approx(exact, abs=0.25)
+    assert without.gains([-columns], [possible])[0][0] == pytest.approx(exact, abs=0.25)
 
 
 def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):

@@ -8,6 +8,7 @@ import pytest
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import probabilities, read, standings
 from wrist_stiffness.inference.point import Background, Group, Point
+from wrist_stiffness.inference.possible import Possible
 from wrist_stiffness.inference.search import LEADERS, Search, Trial
 
 ROWS, CANDIDATES = 60, LEADERS + 4
@@ -21,7 +22,7 @@ class Fit:
     point: Point
 
 
-ANYTHING = np.array([-np.inf]), np.array([np.inf])
+ANYTHING = Possible(np.array([-np.inf]), np.array([np.inf]))
 
 
 class Disappointing:
@@ -61,7 +62,7 @@ class Disappointing:
 
     def trials(self, fit):
         return [
-            Trial(name, True, (((), -each),), *ANYTHING)
+            Trial(name, True, (((), -each),), ANYTHING)
             for name, each in self.slopes.items()
             if name not in fit.names
         ]

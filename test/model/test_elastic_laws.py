@@ -9,7 +9,7 @@ from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, LINKS
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.statics import component_shares
 from wrist_stiffness.model.block import Load
-from wrist_stiffness.model.effects.spring import COUPLINGS, KEYS
+from wrist_stiffness.model.effects.spring import COUPLINGS, KEYS, FrameCompliance
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.parameters import si_factor
 
@@ -131,6 +131,18 @@ def test_springs_store_energy_and_are_reciprocal(weightless, make, name):
     scale = np.abs(compliance).max()
     assert np.allclose(compliance, compliance.T, atol=1e-9 * scale)
     assert np.linalg.eigvalsh(compliance).min() > -1e-9 * scale
+
+
+def test_a_spring_that_gives_back_more_than_it_got_cannot_be():
+    """Any spring of energies above 0 can, however its axes are turned; any other cannot."""
+    rng = np.random.default_rng(4)
+    root = np.sqrt([1e-6] * 3 + [1e-3] * 3)[:, None] * np.linalg.qr(rng.normal(size=(40, 6, 6)))[0]
+    soft = rng.uniform(0.1, 3.0, size=(40, 6))
+    soft[20:, 0] = -0.1
+    own = np.einsum("nij,nj,nkj->nik", root, soft, root)
+    places = {key: (i, i) for i, key in enumerate(KEYS)} | COUPLINGS
+    can = FrameCompliance().possible({key: own[:, i, j] for key, (i, j) in places.items()})
+    assert can.tolist() == [True] * 20 + [False] * 20
 
 
 def test_frame_gives_under_all_that_hangs_on_it(free_model, make):

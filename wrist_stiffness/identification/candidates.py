@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.possible import Possible
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.columns import Carried, Factor, Recipe, Shape, Values
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.law import Law
+from wrist_stiffness.model.parameters import Parameter, si_factor
 from wrist_stiffness.model.registry import catalogue, find_law
 from wrist_stiffness.sessions.columns import Effects, SessionModel
 from wrist_stiffness.sessions.refitted import SET_UP
@@ -83,14 +86,36 @@ class WristCandidate:
         return np.array([each.plausible for each in self._factors])
 
     @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Least and most that is possible of these factors, in usual sizes, (k,) each."""
+    def possible(self) -> Possible:
+        """What these factors can be, in usual sizes."""
+        known = {each.key: each for each in self.law.parameters(self.place)}
+        names = [each.name for each in self._factors]
+        if set(names) <= set(known):
+            return possible(self.law, tuple(known[name] for name in names))
         lower = np.array([each.lower for each in self._factors]) / self.usual
-        return lower, np.array([each.upper for each in self._factors]) / self.usual
+        return Possible(lower, np.array([each.upper for each in self._factors]) / self.usual)
 
     @property
     def _factors(self) -> list[Factor]:
         return [column.factor for column in self.recipe.columns(self.shapes[0])]
+
+
+@cache
+def possible(law: Law, parameters: tuple[Parameter, ...]) -> Possible:
+    """Return what parameters of a law can be, from their means in their typical magnitudes."""
+    mean, scale = np.array([(each.mean, each.scale) for each in parameters]).T
+    lower = (np.array([each.lower for each in parameters]) - mean) / scale
+    upper = (np.array([each.upper for each in parameters]) - mean) / scale
+    if type(law).possible is Law.possible:
+        return Possible(lower, upper)
+    size = np.array([si_factor(each.key) for each in parameters])
+
+    def together(z: Array) -> Mask:
+        values = (mean + z * scale) * size
+        named = zip(parameters, values.T, strict=True)
+        return law.possible({each.key: own for each, own in named})
+
+    return Possible(lower, upper, together)
 
 
 def compensable(law: Law, place: str, points: bool = True) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from wrist_stiffness.identification.base_fit import BaseFit
+from wrist_stiffness.identification.candidates import possible
 from wrist_stiffness.identification.likelihood import WristTable
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.evidence import Evidence, known_noise
@@ -143,7 +144,7 @@ class WristFit:
             unknown = base.problem.unknowns[place]
             z[place] = (unknown.mean + base.z[place] * unknown.step - own.mean) / own.scale
         weight = base.problem.weights.copy()
-        effects, sizing = {}, {}
+        effects, sizing, can = {}, {}, {}
         for name, places in self.places.items():
             known = [place for place in places.tolist() if place in self.sized]
             if not known:
@@ -152,6 +153,7 @@ class WristFit:
             effect = base.problem.free[base.problem.unknowns[known[0]].free].effect
             keys = effect.law.sized_by(effect.component)
             effects[name] = np.array(known, dtype=np.intp)
+            can[name] = possible(effect.law, tuple(self.sized[n] for n in known))
             sizing[name] = np.array([n for n in known if self.sized[n].key in keys], dtype=np.intp)
         return Point(
             table.whiten(base.residual),
@@ -163,6 +165,7 @@ class WristFit:
             varied,
             self.gives,
             sizing=sizing,
+            possible=can,
         )
 
     def without_numbers(self, name: str) -> Point:

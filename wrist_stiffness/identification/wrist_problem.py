@@ -91,7 +91,7 @@ class WristProblem:
             (shape, self.table.whiten(-candidate.at(shape) * candidate.usual))
             for shape in candidate.shapes
         ]
-        return Trial(candidate.name, candidate.law.smooth, tuple(blocks), *candidate.bounds)
+        return Trial(candidate.name, candidate.law.smooth, tuple(blocks), candidate.possible)
 
     def giving(self, fit: WristFit) -> Sequence[tuple[Array, WristFit]]:
         """Return the fits in which one more law gives, with the column (N,) which that adds."""

@@ -52,7 +52,7 @@ def evidence(point: Point, background: Background, near: Evidence | None = None)
     while background.whole is None:
         asked = {n: size for n, (gain, size) in further(at, background).items() if gain > 0.0}
         tried = _pruned(settled(_beside(at, {**_sizes(at), **asked}))) if asked else at
-        if tried.log < at.log + ENOUGH:
+        if tried.unbounded < at.unbounded + ENOUGH:
             break
         at = tried
     at = _pruned(settled(at))
@@ -72,9 +72,9 @@ def settled(at: Evidence) -> Evidence:
                 amplitude=np.maximum(at.amplitude * np.exp(share * step), OFF),
                 excess=at.excess * (excess / at.excess) ** share,
             )
-            if trial.log > at.log:
+            if trial.unbounded > at.unbounded:
                 break
-        gained = trial.log - at.log
+        gained = trial.unbounded - at.unbounded
         at = trial if gained > 0.0 else at
         if gained < ENOUGH:
             break
@@ -140,7 +140,7 @@ def _pruned(at: Evidence) -> Evidence:
         if group.expected:
             continue
         absent = _beside(at, {n: size for n, size in sizes.items() if n != number})
-        if absent.log > at.log:
+        if absent.unbounded > at.unbounded:
             at = absent
             del sizes[number]
     return at

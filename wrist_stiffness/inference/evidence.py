@@ -25,6 +25,7 @@ from scipy.special import gammaln
 
 from wrist_stiffness.inference.giving import SPREAD, Give
 from wrist_stiffness.inference.point import Background, Group, Point
+from wrist_stiffness.inference.possible import Possible
 from wrist_stiffness.inference.projection import NEGLIGIBLE
 
 Array = NDArray[np.float64]
@@ -126,6 +127,23 @@ class Evidence:
     @cached_property
     def log(self) -> float:
         """Natural logarithm of the evidence, up to what all sets of a table share."""
+        return self.unbounded + sum(
+            self.point.possible[name].gain(self.point.z[own] + self.step[own], self._about(own))
+            for name, own in self.point.effects.items()
+            if name in self.point.possible
+        )
+
+    def _about(self, places: NDArray[np.intp]) -> Array:
+        """Covariance of some unknowns, (k, k)."""
+        factor, scale, _, _ = self._solved
+        unit = np.zeros((len(scale), len(places)))
+        unit[places, np.arange(len(places))] = scale[places]
+        half = solve_triangular(factor, unit, lower=True, check_finite=False)
+        return np.asarray(half.T @ half)
+
+    @cached_property
+    def unbounded(self) -> float:
+        """The same if every value of the unknowns were possible."""
         factor, scale, step, slope = self._solved
         precision, offset, correction = self._priors
         n, ground = self.point.count, self.background
@@ -145,7 +163,7 @@ class Evidence:
         precision, offset, _ = usual._priors
         _, _, step, slope = usual._solved
         cost = usual._known[2] + float(precision @ offset**2 + slope @ step)
-        return usual.log + 0.5 * (cost - self.point.count)
+        return usual.unbounded + 0.5 * (cost - self.point.count)
 
     def cost(self, point: Point) -> float:
         """Return minus twice the log posterior of a point, up to what all points share.
@@ -373,7 +391,7 @@ class Evidence:
         return float(np.sqrt(max(np.linalg.eigvalsh(information)[-1], 0.0)))
 
     def gains(
-        self, blocks: Sequence[Array], bounds: Sequence[tuple[Array, Array]] | None = None
+        self, blocks: Sequence[Array], possible: Sequence[Possible] | None = None
     ) -> list[tuple[float, Array]]:
         """Return what effects would each add to the log evidence, to first order.
 
@@ -382,8 +400,8 @@ class Evidence:
         blocks : sequence of (N, k) arrays
             Change of what is left by the unknowns of each effect, whitened, in standard deviations
             of their priors.
-        bounds : sequence of ((k,), (k,)) arrays, optional
-            What is possible of these unknowns, least and most; anything by default.
+        possible : sequence of Possible, optional
+            What these unknowns can be; anything by default.
 
         Returns
         -------
@@ -401,7 +419,7 @@ class Evidence:
         for n, (first, end) in enumerate(zip(ends - counts, ends, strict=True)):
             own, beside = columns[:, first:end], mixed[:, first:end]
             information = (own.T @ own - beside.T @ beside / self.excess) / self.excess
-            found.append(_gain(information, slope[first:end], bounds[n] if bounds else None))
+            found.append(_gain(information, slope[first:end], possible[n] if possible else None))
         return found
 
     def scores(
@@ -437,28 +455,37 @@ class Evidence:
         ]
 
 
-def _gain(
-    information: Array, slope: Array, bounds: tuple[Array, Array] | None
-) -> tuple[float, Array]:
+def _gain(information: Array, slope: Array, possible: Possible | None) -> tuple[float, Array]:
     """Return the gain of an effect and its unknowns: Laplace's method at the better of two modes.
 
     The prior has a peak and tails: a large effect is found from the side of the tails.  Unknowns
     that would go beyond what is possible stay at the bound, and their room to move is none.
     """
     z, free = np.zeros(len(slope)), np.ones(len(slope), dtype=bool)
+    if possible is None:
+        gain, z, _ = _best_mode(information, slope)
+        return gain, z
     while True:
         rest = slope - information @ np.where(free, 0.0, z)
-        own = information[np.ix_(free, free)], rest[free]
-        gain, z[free] = max((_mode(*own, near) for near in (1.0, 1e-8)), key=lambda each: each[0])
-        if bounds is None or not (beyond := free & ((z < bounds[0]) | (z > bounds[1]))).any():
+        gain, z[free], whole = _best_mode(information[np.ix_(free, free)], rest[free])
+        beyond = free & ((z < possible.lower) | (z > possible.upper))
+        if not beyond.any():
             break
         free &= ~beyond
-        z = np.clip(z, *bounds)
+        z = np.clip(z, possible.lower, possible.upper)
+    covariance = np.eye(len(z))
+    covariance[np.ix_(free, free)] = np.linalg.inv(whole)
     held = np.where(free, 0.0, z)
-    return gain + float(slope @ held - 0.5 * held @ information @ held), z
+    gain += float(slope @ held - 0.5 * held @ information @ held)
+    return gain + possible.gain(z, covariance), z
 
 
-def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array]:
+def _best_mode(information: Array, slope: Array) -> tuple[float, Array, Array]:
+    modes = (_mode(information, slope, near) for near in (1.0, 1e-8))
+    return max(modes, key=lambda each: each[0])
+
+
+def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array, Array]:
     count = len(slope)
     for _ in range(5):
         whole = information + weight * np.eye(count)
@@ -466,7 +493,7 @@ def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array
         weight = size_weight(float(z @ z), count)
     fits = float(slope @ z - 0.5 * z @ information @ z)
     prior = log_size_prior(float(z @ z), count) + 0.5 * count * np.log(2.0 * np.pi)
-    return fits + prior - 0.5 * float(np.linalg.slogdet(whole)[1]), np.asarray(z)
+    return fits + prior - 0.5 * float(np.linalg.slogdet(whole)[1]), np.asarray(z), whole
 
 
 def known_noise(point: Point, background: Background) -> Evidence:

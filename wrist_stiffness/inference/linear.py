@@ -18,6 +18,7 @@ from wrist_stiffness.inference.nuisance import Nuisance, NuisanceColumns, nuisan
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.possible import Possible
 from wrist_stiffness.inference.projection import SQUARED_ROUNDING
 from wrist_stiffness.inference.search import Ranked, Trial
 
@@ -107,6 +108,7 @@ class LinearFit:
             np.concatenate([np.zeros((len(columns), 0)), *inexact], axis=1),
             varied,
             linear=not free.shape[1] and not held.any(),
+            possible={name: problem.possible(term.candidate) for name, term in self.terms.items()},
         )
 
 
@@ -267,13 +269,15 @@ class LinearProblem:
     def _bounds(self, fit: LinearFit) -> tuple[Array, Array]:
         lower, upper = np.full(len(fit.z), -np.inf), np.full(len(fit.z), np.inf)
         for name, places in fit.places.items():
-            lower[places], upper[places] = self._bounds_of(fit.terms[name].candidate)
+            own = self.possible(fit.terms[name].candidate)
+            lower[places], upper[places] = own.lower, own.upper
         return lower, upper
 
-    def _bounds_of(self, candidate: Candidate) -> tuple[Array, Array]:
+    def possible(self, candidate: Candidate) -> Possible:
+        """Return what the parameters of a candidate can be."""
         size = self.sizes[candidate.name]
         lower = np.array([each.lower for each in candidate.parameters]) / size
-        return lower, np.array([each.upper for each in candidate.parameters]) / size
+        return Possible(lower, np.array([each.upper for each in candidate.parameters]) / size)
 
     def _best_shape(self, fit: LinearFit, terms: Mapping[str, Term], name: str) -> Shape:
         candidate, start = terms[name].candidate, terms[name].shape
@@ -305,7 +309,7 @@ class LinearProblem:
 
     def _trial(self, candidate: Candidate) -> Trial:
         blocks = [(shape, -self._whitened(candidate, shape)) for shape in candidate.shapes]
-        return Trial(candidate.name, True, tuple(blocks), *self._bounds_of(candidate))
+        return Trial(candidate.name, True, tuple(blocks), self.possible(candidate))
 
     def _sizes(self, candidate: Candidate) -> Array:
         """Return the scales of the priors of the parameters, (k,)."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.inference.giving import Give
+from wrist_stiffness.inference.possible import Possible
 
 Array = NDArray[np.float64]
 
@@ -185,6 +186,8 @@ class Point:
     sizing : dict of str to (k,) int
         Places of those that say how large an effect is, where not all do: these have a size in
         common, of which little is known; the others lie within their typical magnitudes.
+    possible : dict of str to Possible
+        What the unknowns of each effect can be; anything where it is not told.
     """
 
     left: Array
@@ -198,6 +201,7 @@ class Point:
     linear: bool = False
     numbers: int = 0
     sizing: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
+    possible: Mapping[str, Possible] = field(default_factory=dict)
     _beside: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property

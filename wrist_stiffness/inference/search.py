@@ -18,6 +18,7 @@ from wrist_stiffness.inference.amplitudes import ENOUGH, evidence
 from wrist_stiffness.inference.evidence import Array, Evidence
 from wrist_stiffness.inference.giving import GIVES, WAYS
 from wrist_stiffness.inference.point import EXPECTED, Background, Point
+from wrist_stiffness.inference.possible import Possible
 
 LEADERS = 6
 """Candidates of each ranking that are fitted whole."""
@@ -64,15 +65,14 @@ class Trial:
     blocks : tuple of ((s,) floats, (N, k) array)
         At points of the grid of what is not linear in it: change of what is left by each unknown,
         whitened, in standard deviations of the priors.
-    lower, upper : (k,) float
-        What is physically possible of the unknowns.
+    possible : Possible
+        What the unknowns can be.
     """
 
     name: str
     smooth: bool
     blocks: tuple[tuple[tuple[float, ...], Array], ...]
-    lower: Array
-    upper: Array
+    possible: Possible
 
     @property
     def law(self) -> str:
@@ -417,9 +417,7 @@ def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
     best: dict[str, Ranked] = {}
     if not flat:
         return []
-    gains = at.gains(
-        [columns for _, _, columns in flat], [(each.lower, each.upper) for each, _, _ in flat]
-    )
+    gains = at.gains([columns for _, _, columns in flat], [each.possible for each, _, _ in flat])
     for (trial, shape, _), (gain, z) in zip(flat, gains, strict=True):
         gain -= _of_shape(shape, at.point)
         if trial.name not in best or best[trial.name].gain < gain:

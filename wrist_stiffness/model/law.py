@@ -7,8 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.components import ElasticComponents
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.columns import Recipe, tangents
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
@@ -98,6 +101,13 @@ class Law:
         The others lie within their typical magnitudes, however large the effect is.
         """
         return tuple(each.key for each in self.parameters(place))
+
+    def possible(self, values: Mapping[str, Array]) -> NDArray[np.bool_]:
+        """Tell which of n sets of values, in SI units, a machine can have, (n,).
+
+        By default all within the bounds of each parameter.
+        """
+        return np.ones(len(next(iter(values.values()))), dtype=bool)
 
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return how the law becomes columns, and where a fit of it begins.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.law import Contribution, Law
@@ -12,6 +13,7 @@ from wrist_stiffness.model.parameters import (
     FORCE,
     MOMENT,
     Parameter,
+    axis_keys,
     symmetric,
     symmetric_vector,
     vector,
@@ -105,8 +107,14 @@ class LoadCrossTalk(Law):
 TURN_BASE, TURN_PLATFORM = "base_{}_mdeg", "platform_{}_mdeg"
 
 
+MOST_TURN_MDEG, USUAL_TURN_MDEG = 180e3, 500.0
+
+
 class LoadMisalignment(Law):
-    """The true wrench is the said one turned about O by a small angle, fixed in F and in U."""
+    """The true wrench is the said one turned about O: by one turn fixed in F, after one in U.
+
+    Each is a rotation vector: a sensor may be mounted a quarter turn off.
+    """
 
     id = "load_misalignment"
     stage = "load"
@@ -115,16 +123,18 @@ class LoadMisalignment(Law):
     check = "hang a weight and compare the direction that the sensor says at several tilts"
     excited_by = "loads of several directions at several poses"
     inexactness = 0.0
-    own = (
-        *symmetric_vector(TURN_BASE, 1e4, 500.0),
-        *symmetric_vector(TURN_PLATFORM, 1e4, 500.0),
+    own = tuple(
+        Parameter(key, -MOST_TURN_MDEG, MOST_TURN_MDEG, USUAL_TURN_MDEG, linear=False)
+        for pattern in (TURN_BASE, TURN_PLATFORM)
+        for key in axis_keys(pattern)
     )
 
     def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return true minus said."""
-        turn = vector(values, TURN_BASE) + at.body("platform") @ vector(values, TURN_PLATFORM)
-        halves = cross(turn, at.load[:, :3]), cross(turn, at.load[:, 3:])
-        return Contribution(wrench=np.concatenate(halves, axis=1))
+        base = Rotation.from_rotvec(vector(values, TURN_BASE))
+        platform = Rotation.from_rotvec(at.body("platform") @ vector(values, TURN_PLATFORM))
+        halves = [(base * platform).apply(at.load[:, own]) for own in (slice(3), slice(3, 6))]
+        return Contribution(wrench=np.concatenate(halves, axis=1) - at.load)
 
 
 LEVER_BASE, LEVER_PLATFORM = "base_{}_mm", "platform_{}_mm"

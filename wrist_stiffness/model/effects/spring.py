@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
@@ -51,14 +52,28 @@ class Spring(Law, ABC):
         *(symmetric(key, *COUPLED["_".join(key.split("_")[-3:])]) for key in COUPLINGS),
     )
 
+    def possible(self, values: Mapping[str, Array]) -> NDArray[np.bool_]:
+        """Tell which springs yield to every load: no other gives back more than it got."""
+        compliance = _compliance(values)
+        own = np.einsum("nii->ni", compliance)
+        scale = 1.0 / np.sqrt(np.maximum(own, np.finfo(float).tiny))
+        alike = compliance * scale[:, :, None] * scale[:, None, :]
+        return np.asarray(np.linalg.eigvalsh(alike)[..., 0] >= 0.0)
+
     def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the deflection under the wrench through the place."""
-        point = self.centre(at.table.geometry, place)
-        compliance = np.diag([values[key] for key in KEYS])
-        for key, (i, j) in COUPLINGS.items():
-            compliance[i, j] = compliance[j, i] = values.get(key, 0.0)
+        point, compliance = self.centre(at.table.geometry, place), _compliance(values)
         local = wrench_at(point, at.at_home(place, at.through_place(place)))
         return at.screw(place, screw_from(point, local @ compliance))
+
+
+def _compliance(values: Mapping[str, float] | Mapping[str, Array]) -> Array:
+    """Return the symmetric compliances (..., 6, 6) of values that are numbers or (n,) each."""
+    places = {**{key: (i, i) for i, key in enumerate(KEYS)}, **COUPLINGS}
+    found = np.zeros((*np.shape(values[KEYS[0]]), 6, 6))
+    for key, (i, j) in places.items():
+        found[..., i, j] = found[..., j, i] = values.get(key, 0.0)
+    return found
 
 
 class MountCompliance(Spring):

@@ -1,0 +1,80 @@
+"""What values the unknowns of an effect can have, and what that is worth as evidence.
+
+The priors of unknowns spread over values that cannot be: a spring that pushes the load away, a
+clearance below zero.  What is possible of a prior has a share of its probability, and what is
+possible of the posterior a share of that; the evidence of the law is larger by their quotient than
+that of the law without bounds (Klugkist and Hoijtink 2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+Array = NDArray[np.float64]
+
+PRIOR_DRAWS, DRAWS = 100_000, 4_000
+"""Draws that estimate a share that only a test of whole sets of values can tell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Possible:
+    """What the unknowns of one effect can be, in the standard deviations of their priors.
+
+    Parameters
+    ----------
+    lower, upper : (k,) float
+        Least and most of each.
+    together : callable, optional
+        (n, k) values within these bounds -> (n,) whether such a set of values can be; any can by
+        default.
+    """
+
+    lower: Array
+    upper: Array
+    together: Callable[[Array], NDArray[np.bool_]] | None = None
+
+    @cached_property
+    def log_prior(self) -> float:
+        """Logarithm of the share of the prior that is possible."""
+        low, high = ndtr(self.lower), ndtr(self.upper)
+        log = float(np.sum(np.log(high - low)))
+        if self.together is not None:
+            random = np.random.default_rng(0)
+            draws = ndtri(low + (high - low) * random.random((PRIOR_DRAWS, len(low))))
+            log += _log_share(self.together(draws))
+        return log
+
+    def gain(self, z: Array, covariance: Array) -> float:
+        """Return what bounds add to the log evidence of an effect.
+
+        Parameters
+        ----------
+        z : (k,) float
+            Most probable values.
+        covariance : (k, k) float
+            Of a normal posterior about them.
+        """
+        sigma = np.sqrt(np.diag(covariance))
+        if self.together is None:
+            shares = ndtr((self.upper - z) / sigma) - ndtr((self.lower - z) / sigma)
+            log = float(np.sum(np.log(np.maximum(shares, 1.0 / DRAWS))))
+        else:
+            # Two times the same draws: what is compared should not differ by chance.
+            draws = np.random.default_rng(0).standard_normal((DRAWS, len(z)))
+            sizes, vectors = np.linalg.eigh(covariance)
+            draws = z + draws @ (vectors * np.sqrt(np.maximum(sizes, 0.0))).T
+            within = ((draws >= self.lower) & (draws <= self.upper)).all(axis=1)
+            within[within] = self.together(draws[within])
+            log = _log_share(within)
+        return log - self.log_prior
+
+
+def _log_share(are: NDArray[np.bool_]) -> float:
+    """Return the logarithm of a share; where none is, of half a draw."""
+    return float(np.log((np.count_nonzero(are) + 0.5) / (len(are) + 1)))
