@@ -1,7 +1,7 @@
 # Every target sets up what it needs. Another Python: make test PYTHON=python3.12 VENV=.venv312
 PYTHON ?= python3
 VENV ?= .venv
-EXTRAS = ros,fem,plot,progress,web,bench,docs,verify,test,dev
+EXTRAS = ros,fem,plot,progress,web,docs,verify,test,dev
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 READY = $(VENV)/.ready-$(VERSION)
 OTHER = $(filter-out $(READY),$(wildcard $(VENV)/.ready-*))

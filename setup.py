@@ -83,7 +83,6 @@ setup(
         "progress": ["tqdm>=4.66"],
         # The workbench; Plotly's JavaScript comes with it.
         "web": ["nicegui>=3.0"],
-        "bench": ["scikit-learn>=1.3"],
         "docs": ["mkdocs-material>=9.6", "mkdocstrings[python]>=0.29"],
         "verify": ["acrod>=1.2", "rosbags>=0.10", "mcap-ros2-support>=0.5"],
         # colcon finds pytest through this extra and would run no test without it.

@@ -16,11 +16,10 @@ from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.shipped import shipped_file
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 RATE_HZ = 10.0
 
-TRUTH = ("wrist_stiffness.simulation.size", "wrist_stiffness.simulation.size")
+TRUTH = ("wrist_stiffness.simulation.size",)
 """Modules that make a riddle, with all that they import."""
 
 PACKAGE = Path(wrist_stiffness.__file__).parent

@@ -29,8 +29,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from bench_wrist import wrist
 from cases import Case, searched
-from observe import as_read, hidden_effects, measured_session, run_cell
-from score import wilson
+from observe import hidden_effects, observe
+from rates import wilson
 
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.identification.wrist_problem import WristProblem
@@ -96,7 +96,7 @@ def answer(case: Case) -> dict[str, Any]:
         hidden = hidden_effects(case)
         line |= {"truth": beside_base(case, hidden[0]) * hidden[0].magnitude / si_factor(key)}
         line |= {"plausible": is_plausible(hidden[0])}
-        session = as_read(measured_session(case, 0, run_cell(case, hidden, 0)))
+        session = observe(case, hidden, 0)
         problem = WristProblem(model, (as_units(model, session),))
         fit = problem.extended(problem.begin(), effect_at(find_law(law), place, typical)).settled()
     except WristError as error:

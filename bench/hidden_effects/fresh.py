@@ -1,11 +1,11 @@
-"""Fresh riddles, drawn once, on which two searches are compared side by side.
+"""Fresh riddles, drawn once, on which searches are compared.
 
     python bench/hidden_effects/fresh.py run --output results.jsonl [--part 0/2] [--only KIND]
 
 A list that was looked at while the search was mended is no longer fresh.  `unseen` asks every
 effect and every stranger once, on wrists from `--first` on, which nothing else may have used.
 
-With `--names` answers are judged by their names alone: the dictionary of all effects costs hours.
+Answers are judged by their names alone.
 
 `fresh_cases.json` was drawn with `draw` and committed before any search was asked.  The same file
 runs in an older checkout: each line holds a digest of what was measured, so that two files can be
@@ -35,15 +35,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import observe
 from cases import Case, Place, one_each, searched
-from dictionary import design_of, dictionary
-from observe import Riddle, bare_day, pose_riddle
-from observe import observe as observe_day
-from own_diagnosis import diagnosed_sessions
-from score import Judge
+from observe import hidden_effects, run_cell
+from own_diagnosis import diagnosed
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, is_plausible
+from wrist_stiffness.simulation.catalogue import CATALOGUE, STRANGERS, HiddenEffect, is_plausible
 
 LIST = Path(__file__).with_name("fresh_cases.json")
 
@@ -124,22 +121,28 @@ def unseen(first: int) -> list[tuple[str, Case, int, bool]]:
     ]
 
 
-def posed(case: Case, days: int) -> tuple[Riddle, list[MeasuredSession]]:
-    """Return a riddle, whose second day judges, and the sessions that a search may see."""
-    riddle = pose_riddle(case)
-    sessions = [riddle.days[0].read]
+def posed(case: Case, days: int) -> tuple[tuple[HiddenEffect, ...], list[MeasuredSession]]:
+    """Return what hides, and the sessions that a search may see.
+
+    Raises
+    ------
+    InputError
+        If the size is out of reach, or the wrist finds no equilibrium on one of the days.
+    """
+    hidden = hidden_effects(case)
+    sessions = [observe.observe(case, hidden, 0)]
+    # Nobody sees the next day, but a wrist that cannot do its motions is none of the riddles.
+    run_cell(case, hidden, 1)
     if days == 2:
-        third = observe_day(case, riddle.hidden, 2, bare_day(case.bare, 2))
-        sessions.append(third.read)
-    return riddle, sessions
+        sessions.append(observe.observe(case, hidden, 2))
+    return hidden, sessions
 
 
 def dense(case: Case) -> MeasuredSession:
     """Return a session at 100 Hz whose instrument says nothing of its scatter."""
     usual, observe.RATE_HZ = observe.RATE_HZ, DENSE_HZ
     try:
-        sample = observe.run_cell(case, (), 0)
-        session = observe.as_read(observe.measured_session(case, 0, sample))
+        session = observe.observe(case, (), 0)
     finally:
         observe.RATE_HZ = usual
     return replace(session, covariance=None)
@@ -154,49 +157,39 @@ def digest(sessions: Sequence[MeasuredSession]) -> str:
     return found.hexdigest()[:12]
 
 
-def answer(group: str, case: Case, days: int, stated: bool, names: bool) -> dict[str, Any]:
-    """Return the line of one riddle, judged by a dictionary of all effects or by names alone."""
+def answer(group: str, case: Case, days: int, stated: bool) -> dict[str, Any]:
+    """Return the line of one riddle."""
     line: dict[str, Any] = {"group": group, "key": case.key, "seed": case.seed, "size": case.size}
-    riddle = None
+    hidden: tuple[HiddenEffect, ...] = ()
     try:
         if stated:
-            riddle, sessions = posed(case, days)
+            hidden, sessions = posed(case, days)
         else:
             sessions = [dense(case)]
     except InputError as error:
         return line | {"out_of_reach": str(error)}
-    hidden = () if riddle is None else riddle.hidden
     line |= {
         "digest": digest(sessions),
         "truth": [f"{each.effect}@{each.component}" for each in hidden],
     }
     begun, clock = time.process_time(), time.perf_counter()
     try:
-        found = diagnosed_sessions(riddle, sessions, case.seed)
+        found = diagnosed(sessions)
     except Exception as error:
         return line | {"error": repr(error)}
     line |= {"cpu_s": time.process_time() - begun, "seconds": time.perf_counter() - clock}
-    line |= {"verdict": found.verdict, "named": [list(each) for each in found.classes]}
-    line |= found.details
-    if riddle is None:
-        return line
-    if names:
-        return line | by_names(line, riddle)
-    words = dictionary(design_of(case), Path(os.environ.get("DICTIONARIES", ".")))
-    score = asdict(Judge(riddle, words).line("own", found, "", line["seconds"]))
-    kept = ("kind", "plausible", "excitation", "detectability", "top", "inside", "found")
-    kept += ("class_size", "spurious", "not_excited", "before", "after")
-    return line | {name: score[name] for name in kept}
+    return line | found | judged(found["named"], hidden)
 
 
-def by_names(line: dict[str, Any], riddle: Riddle) -> dict[str, Any]:
-    """Return what names alone tell of an answer, the size of the effect aside."""
-    hits = [any(name in names for names in line["named"]) for name in line["truth"]]
+def judged(named: Sequence[Sequence[str]], hidden: Sequence[HiddenEffect]) -> dict[str, Any]:
+    """Return what kind of riddle it was, and which share of its effects stand in a class."""
+    truth = [f"{each.effect}@{each.component}" for each in hidden]
+    hits = [any(name in names for names in named) for name in truth]
     kind = ("none", "single", "double")[len(hits)]
-    if any(each.effect in {one[0] for one in searched(STRANGERS)} for each in riddle.hidden):
+    if any(each.effect in STRANGERS for each in hidden):
         kind = "stranger"
     found = float(np.mean(hits)) if hits else 0.0
-    plausible = all(is_plausible(each) for each in riddle.hidden)
+    plausible = all(is_plausible(each) for each in hidden)
     return {"kind": kind, "plausible": plausible, "inside": any(hits), "found": found}
 
 
@@ -205,7 +198,6 @@ def run(
     output: Path,
     part: tuple[int, int],
     only: str,
-    names: bool,
 ) -> None:
     """Ask all riddles of a part that have no line yet."""
     done = set()
@@ -214,7 +206,7 @@ def run(
     for number, (group, case, days, stated) in enumerate(riddles):
         if number % part[1] != part[0] or case.seed in done or only not in group:
             continue
-        line = answer(group, case, days, stated, names)
+        line = answer(group, case, days, stated)
         with output.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
         print(number, json.dumps(line)[:300], flush=True)
@@ -227,9 +219,6 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("fresh.jsonl"))
     parser.add_argument("--part", default="0/1", help="which of how many parts of the list")
     parser.add_argument("--only", default="", help="only groups whose name holds this")
-    parser.add_argument(
-        "--names", action="store_true", help="judge names alone; a dictionary costs hours"
-    )
     parser.add_argument("--first", type=int, default=9101, help="seed of the first unseen wrist")
     given = parser.parse_args()
     if given.what == "draw":
@@ -238,7 +227,7 @@ def main() -> None:
         return
     first, count = map(int, given.part.split("/"))
     riddles = unseen(given.first) if given.what == "unseen" else listed()
-    run(riddles, given.output, (first, count), given.only, given.names)
+    run(riddles, given.output, (first, count), given.only)
 
 
 if __name__ == "__main__":

@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 from bench_wrist import wrist
-from cases import Case, full_cases
+from cases import Case, singles
 from kept_lines import asked
 from observe import hidden_effects, observe
 from own_diagnosis import version_of_own
-from tables import newcombe
+from rates import newcombe
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
@@ -56,7 +56,7 @@ def ask(case: Case) -> list[dict[str, Any]]:
     lines = []
     for minutes in MINUTES:
         longer = LongCase(**vars(case), minutes=minutes)
-        session = observe(longer, hidden, 0).read
+        session = observe(longer, hidden, 0)
         model = ErrorModel("benchmark", wrist(), "closed_form")
         found = diagnose_sessions(model, [session]).diagnosis
         classes = [finding.names for finding in found.findings]
@@ -108,8 +108,7 @@ def main() -> None:
         "--output", type=Path, default=Path(__file__).parent / "results" / "how_long.jsonl"
     )
     arguments = parser.parse_args()
-    singles = [case for case in full_cases() if case.main and case.kind == "single"]
-    chosen = singles[:: arguments.every]
+    chosen = singles()[:: arguments.every]
     print(table(asked(ask, chosen, arguments.output, version_of_own(), arguments.processes)))
 
 

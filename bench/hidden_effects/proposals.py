@@ -32,9 +32,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from bench_wrist import Array, wrist
 from blind_strangers import BLIND, register
 from cases import Case, one_each
-from observe import as_read, hidden_effects, measured_session, run_cell
+from observe import hidden_effects, observe
+from rates import wilson
 from right_sentences import is_right, right_components
-from score import wilson
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.proposal import Proposal
@@ -76,10 +76,10 @@ def answer(case: Case) -> dict[str, Any]:
     line: dict[str, Any] = {"seed": case.seed, "size": case.size}
     line["truth"] = list(case.effects[0][:2]) if case.effects else []
     try:
-        sample = run_cell(case, hidden_effects(case) if case.effects else (), 0)
+        session = observe(case, hidden_effects(case), 0)
     except InputError as error:
         return line | {"out_of_reach": str(error)}
-    whole = as_units(model, as_read(measured_session(case, 0, sample)))
+    whole = as_units(model, session)
     held = np.isin(time_blocks(np.zeros(len(whole), dtype=np.int64), STRETCHES) % 3, (1,))
     problem = WristProblem(model, (without(whole, held),))
     fit = problem.begin()

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from score import wilson
+from rates import wilson
 
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
@@ -25,9 +25,6 @@ Line = dict[str, Any]
 Array = NDArray[np.float64]
 
 BINS = np.array([0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0])
-
-NEAR = 1.1
-"""Error after, over that of a wrist without the effect, up to which an effect is done with."""
 
 
 def right(line: Line, names: Sequence[str]) -> bool:
@@ -61,7 +58,7 @@ def verdicts(lines: Sequence[Line]) -> tuple[Array, NDArray[np.bool_]]:
 
 def expected(line: Line) -> str:
     """Return the right verdict."""
-    if not line["truth"] or line["kind"] in ("unexcitable", "absorbed"):
+    if not line["truth"]:
         return "none"
     return "unknown" if line["kind"] == "stranger" else "effect"
 
@@ -109,11 +106,6 @@ def rows(
         ),
         ("one effect: right in the class", single, in_class),
         ("one effect: a false class", single, lambda x: spurious(x) > 0),
-        (
-            "one effect: error after within 1.1",
-            [x for x in single if "after" in x],
-            lambda x: x["after"] <= NEAR,
-        ),
         ("two effects: both found", double, lambda x: x["found"] == 1.0),
         ("outside the catalogue: nothing is named", outside, lambda x: not x["named"]),
         ("two days, one effect: right in the class", days, in_class),
@@ -152,9 +144,9 @@ def main() -> None:
     parser.add_argument("--picture", type=Path)
     given = parser.parse_args()
     found = [json.loads(line) for line in given.results.read_text().splitlines()]
-    lines = [line | {"kind": line.get("kind", "none")} for line in found if "verdict" in line]
-    likely = [line for line in lines if line.get("plausible", True)]
-    large = [line for line in lines if not line.get("plausible", True)]
+    lines = [line for line in found if "verdict" in line]
+    likely = [line for line in lines if line["plausible"]]
+    large = [line for line in lines if not line["plausible"]]
     print(
         f"{len(found)} riddles, {len(lines)} answered, {len(large)} of them larger than on a wrist"
     )
