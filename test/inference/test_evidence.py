@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 from scipy.stats import multivariate_normal, multivariate_t
+from scipy.stats import t as student_t
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.evidence import TAIL, Evidence, log_size_prior
+from wrist_stiffness.inference.evidence import Evidence, log_size_prior
 from wrist_stiffness.inference.point import Background, Group, Point
-from wrist_stiffness.inference.possible import Possible
+from wrist_stiffness.inference.possible import TAIL, Possible
 
 ROWS = 14
 
@@ -166,6 +167,17 @@ def test_the_evidence_is_the_integral_over_what_is_possible(rng, size, possible)
     bounded = Evidence(replace(at, possible={"a": possible}), ground, one, 1.0)
     assert bounded.log - without.log == pytest.approx(exact, abs=0.25)
     assert without.gains([-columns], [possible])[0][0] == pytest.approx(exact, abs=0.25)
+
+
+@pytest.mark.parametrize("least", [3.0, 10.0, 1e3, 1e12])
+def test_bounds_far_from_what_is_usual_are_no_evidence_without_end(least):
+    """A user's law that is nowhere usual gains by the tail of its prior, and no more than that."""
+    gain = Possible(np.array([least]), np.array([np.inf])).gain(
+        np.array([least + 50.0]), np.array([[1.0]])
+    )
+    assert 0.0 < gain < 10.0
+    if least <= 10.0:
+        assert gain == pytest.approx(-np.log(student_t(TAIL).sf(least)), abs=1e-6)
 
 
 def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):

@@ -12,8 +12,9 @@ from scipy.special import gammaln
 from wrist_stiffness.identification.forms import Form, Shape, Span, evaluated, forms
 from wrist_stiffness.identification.proposal import twins
 from wrist_stiffness.identification.wrist_fit import WristFit
-from wrist_stiffness.inference.evidence import TAIL, Evidence
+from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.point import OUTSIDE
+from wrist_stiffness.inference.possible import TAIL
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.batch import CHUNK
 from wrist_stiffness.model.evaluation import evaluate

@@ -25,14 +25,10 @@ from scipy.special import gammaln
 
 from wrist_stiffness.inference.giving import SPREAD, Give
 from wrist_stiffness.inference.point import Background, Group, Point
-from wrist_stiffness.inference.possible import Possible
+from wrist_stiffness.inference.possible import TAIL, Possible
 from wrist_stiffness.inference.projection import NEGLIGIBLE
 
 Array = NDArray[np.float64]
-
-TAIL = 2.0
-"""Degrees of freedom of the prior of an effect's size (assumed), a multivariate t: a fault ten
-times as large as the effect of an ordinary wrist is rare, but no wonder."""
 
 MISFIT = 0.05
 """Prior probability that units scatter more than is known of their noise (assumed)."""

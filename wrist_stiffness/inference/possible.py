@@ -14,9 +14,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr, ndtri, stdtr
 
 Array = NDArray[np.float64]
+
+TAIL = 2.0
+"""Degrees of freedom of the prior of an effect's size (assumed), a multivariate t: a fault ten
+times as large as the effect of an ordinary wrist is rare, but no wonder."""
 
 PRIOR_DRAWS, DRAWS = 100_000, 4_000
 """Draws that estimate a share that only a test of whole sets of values can tell."""
@@ -42,9 +46,9 @@ class Possible:
     @cached_property
     def log_prior(self) -> float:
         """Logarithm of the share of the prior that is possible."""
-        low, high = ndtr(self.lower), ndtr(self.upper)
-        log = float(np.sum(np.log(high - low)))
+        log = _log_shares(stdtr(TAIL, self.lower), stdtr(TAIL, self.upper))
         if self.together is not None:
+            low, high = ndtr(self.lower), ndtr(self.upper)
             random = np.random.default_rng(0)
             draws = ndtri(low + (high - low) * random.random((PRIOR_DRAWS, len(low))))
             log += _log_share(self.together(draws))
@@ -62,8 +66,7 @@ class Possible:
         """
         sigma = np.sqrt(np.diag(covariance))
         if self.together is None:
-            shares = ndtr((self.upper - z) / sigma) - ndtr((self.lower - z) / sigma)
-            log = float(np.sum(np.log(np.maximum(shares, 1.0 / DRAWS))))
+            log = _log_shares(ndtr((self.lower - z) / sigma), ndtr((self.upper - z) / sigma))
         else:
             # Two times the same draws: what is compared should not differ by chance.
             draws = np.random.default_rng(0).standard_normal((DRAWS, len(z)))
@@ -73,6 +76,11 @@ class Possible:
             within[within] = self.together(draws[within])
             log = _log_share(within)
         return log - self.log_prior
+
+
+def _log_shares(low: Array, high: Array) -> float:
+    """Return the logarithm of what lies between two shares of each unknown, one draw at least."""
+    return float(np.sum(np.log(np.maximum(high - low, 1.0 / DRAWS))))
 
 
 def _log_share(are: NDArray[np.bool_]) -> float:

@@ -105,8 +105,6 @@ class LoadCrossTalk(Law):
 
 
 TURN_BASE, TURN_PLATFORM = "base_{}_mdeg", "platform_{}_mdeg"
-
-
 MOST_TURN_MDEG, USUAL_TURN_MDEG = 180e3, 500.0
 
 
