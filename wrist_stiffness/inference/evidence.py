@@ -469,6 +469,9 @@ def _gain(information: Array, slope: Array, possible: Possible | None) -> tuple[
             break
         free &= ~beyond
         z = np.clip(z, possible.lower, possible.upper)
+    if not free.any():
+        # What stays at its bounds keeps its prior: data that say no more are no evidence.
+        return gain + float(slope @ z - 0.5 * z @ information @ z), z
     covariance = np.eye(len(z))
     covariance[np.ix_(free, free)] = np.linalg.inv(whole)
     held = np.where(free, 0.0, z)
