@@ -124,6 +124,11 @@ def test_wrong_type_is_named(place):
         assert "is not" in message or "needs a list" in message
 
 
+def test_a_file_without_a_material_is_refused():
+    values = {**VALUES, "materials": {"source": "assumed"}}
+    assert refused(values) == "wrist.yaml: materials: names no material, parts need one"
+
+
 @pytest.mark.parametrize("place", NUMBERS, ids=dotted)
 def test_value_that_is_no_number_is_named(place):
     hint = ": YAML takes it for a text, write "

@@ -111,6 +111,8 @@ def geometry_of(root: Node) -> Geometry:
 
     def read_materials(node: Node) -> None:
         materials.update(mapping_of(read_material, SOURCES)(node))
+        if not materials:
+            raise node.refuse("names no material, parts need one")
 
     axes: dict[str, Array] = {}
 
