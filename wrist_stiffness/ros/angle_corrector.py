@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Mapping
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PoseWithCovarianceStamped
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
@@ -26,7 +26,6 @@ from wrist_stiffness.ros.changes import Change, all_or_none
 from wrist_stiffness.ros.conversions import three
 from wrist_stiffness.ros.guarded_node import ACTIVE, ALL_STATES, CONFIGURED
 from wrist_stiffness.ros.qos import COMMAND_QOS
-from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.sliced_work import SlicedWork
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
@@ -232,12 +231,3 @@ class AngleCorrector(WristNode):
         if self.stream.enabled and supervision.text:
             return f"{supervision.state.value}: {supervision.text}"
         return ""
-
-
-def main() -> NoReturn:
-    """Run the node."""
-    run(AngleCorrector)
-
-
-if __name__ == "__main__":
-    main()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped, Vector3Stamped
@@ -24,7 +24,6 @@ from wrist_stiffness.mechanism.urdf import urdf
 from wrist_stiffness.model.error_model import Prediction
 from wrist_stiffness.ros.conversions import body_transforms, transforms_type
 from wrist_stiffness.ros.qos import SENSOR_QOS, STATE_QOS
-from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
     error_payload,
@@ -156,7 +155,7 @@ class PoseErrorPredictor(WristNode):
         stamp_ns = joints.stamp_ns
         prediction = self.stream.on_joint_state(
             stamp_ns, joints.names, joints.positions, joints.velocities
-        ).prediction
+        )
         frame, twist = self.base_frame, prediction.twist
         self._error.publish(error_payload(stamp_ns, twist, prediction.covariance, frame))
         if self._s_um.get_subscription_count():
@@ -183,12 +182,3 @@ class PoseErrorPredictor(WristNode):
         drawing = drawing_of(geometry, exaggeration, self.base_frame)
         at, twist = prediction.configuration.as_block, prediction.twist[None]
         self._markers.publish(*drawing.payloads(np.array([stamp_ns]), at, twist))
-
-
-def main() -> NoReturn:
-    """Run the node."""
-    run(PoseErrorPredictor)
-
-
-if __name__ == "__main__":
-    main()

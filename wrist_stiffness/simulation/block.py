@@ -2,13 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.statics import component_rotations
 from wrist_stiffness.simulation.heat import HEATED
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Samples = TypeVar("Samples", bound="DataclassInstance")
+
+
+def taken(samples: Samples, rows: int | slice) -> Samples:
+    """Return some of n samples, of which every field is an array (n, ...)."""
+    return type(samples)(*(getattr(samples, each.name)[rows] for each in fields(samples)))
+
+
+def joined(parts: Sequence[Samples]) -> Samples:
+    """Return such samples in a row as one."""
+    names = [each.name for each in fields(parts[0])]
+    return type(parts[0])(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+
+
+Past = tuple[float, Array]
+"""Time [s] and values (...) of the sample before."""
+
+
+def rates(time_s: Array, values: Array, past: Past | None) -> tuple[Array, Past]:
+    """Return how fast values (n, ...) change, and the past of the next block.
+
+    Zero at the very first sample and where time (n,) [s] stands still.
+    """
+    before, last = past or (time_s[0], values[0])
+    change = np.diff(values, axis=0, prepend=last[None])
+    steps = np.diff(time_s, prepend=before).reshape(-1, *[1] * (values.ndim - 1))
+    rate = np.divide(change, steps, out=np.zeros_like(change), where=steps > 0.0)
+    return rate, (float(time_s[-1]), values[-1])
 
 
 @dataclass(frozen=True)
@@ -24,11 +60,9 @@ class Block:
 
     def __getitem__(self, rows: slice) -> Block:
         """Return some of the samples."""
-        whole = self.configuration
-        configuration = Configuration(*(getattr(whole, f.name)[rows] for f in fields(whole)))
         return Block(
             self.time_s[rows],
-            configuration,
+            taken(self.configuration, rows),
             self.load[rows],
             self.flexibility[rows],
             self.temperature[rows],

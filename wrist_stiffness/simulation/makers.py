@@ -15,7 +15,7 @@ from wrist_stiffness.mechanism.components import (
     PASSIVE_JOINTS,
     Array,
 )
-from wrist_stiffness.mechanism.vectors import block_diagonal, skew, unit
+from wrist_stiffness.mechanism.vectors import block_diagonal, screws_to_origin, unit
 from wrist_stiffness.simulation.effect_entry import LEVER, Draw, effect
 from wrist_stiffness.simulation.laws.added_spring import (
     MountSpring,
@@ -59,8 +59,7 @@ def spring(d: Draw, place: Array) -> Array:
     frame = np.linalg.qr(d.rng.normal(size=(3, 3)))[0]
     sizes = np.concatenate([d.rng.uniform(0.3, 1.0, 3), d.rng.uniform(0.3, 1.0, 3) / LEVER**2])
     turn = block_diagonal(frame)
-    move = np.eye(6)
-    move[:3, 3:] = skew(place)
+    move = screws_to_origin(place)
     return move @ turn @ np.diag(sizes) @ turn.T @ move.T
 
 

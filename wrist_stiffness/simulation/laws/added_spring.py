@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,47 +29,46 @@ class MountSpring(Law):
 
 
 @dataclass(frozen=True)
-class _Drive(Bending):
-    """Gears and coupling of a motor."""
+class Drive(Bending, ABC):
+    """Gears and coupling of a motor, which wind up about its axis."""
 
     component: str  # driven joint
     axis: Array  # (3,), motor axis in F
 
-    @property
-    def column(self) -> Array:
-        """Turn about the axis, (6,)."""
-        return np.concatenate([np.zeros(3), self.axis])
+    @abstractmethod
+    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
+        """Return the turn (n,) [rad] under a torque (n,) [N m], and its slope (n,)."""
+
+    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+        """Turn about the motor axis."""
+        about = np.concatenate([np.zeros(3), self.axis])
+        turn, slope = self.wound(block, wrench @ about)
+        return turn[:, None] * about, slope[:, None, None] * np.outer(about, about)
 
 
 @dataclass(frozen=True)
-class StiffeningDrive(_Drive):
+class StiffeningDrive(Drive):
     """Gears whose teeth touch more fully under torque: soft at first, then stiff."""
 
     softness: float  # turn per torque at rest [rad/(N m)]
     torque: float  # torque at which the softness has halved [N m]
 
-    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
         """Turn by a saturating logarithm of the torque."""
-        column = self.column
-        torque = wrench @ column
         turn = self.softness * self.torque * np.arcsinh(torque / self.torque)
-        slope = self.softness / np.sqrt(1.0 + (torque / self.torque) ** 2)
-        return turn[:, None] * column, slope[:, None, None] * np.outer(column, column)
+        return turn, self.softness / np.sqrt(1.0 + (torque / self.torque) ** 2)
 
 
 @dataclass(frozen=True)
-class OneSidedDrive(_Drive):
+class OneSidedDrive(Drive):
     """Gears of which one flank is worn: softer one way than the other."""
 
     softness: tuple[float, float]  # turn per torque, of torques above 0 and below [rad/(N m)]
 
-    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
+    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
         """Turn by the softness of the flank that is loaded."""
-        column = self.column
-        torque = wrench @ column
         softness = np.where(torque > 0.0, *self.softness)
-        turn = (softness * torque)[:, None] * column
-        return turn, softness[:, None, None] * np.outer(column, column)
+        return softness * torque, softness
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,7 @@ def worn_sector(d: Draw) -> Law:
     joint = DRIVEN[d.component]
     axis = d.table.geometry.axes[joint]
     at, width = d.rng.uniform(-0.3, 0.3), d.rng.uniform(0.1, 0.2)
-    return WornSector(joint, MOTOR[d.component], axis, d.magnitude, at, width)
+    return WornSector(joint, axis, MOTOR[d.component], d.magnitude, at, width)
 
 
 # A rotor of half a kilogram, at 20 000 turns a minute.

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross, dot
-from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.block import Block, Past, rates
 from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.joint_friction import joint_turn
 from wrist_stiffness.simulation.laws.law import (
@@ -82,7 +82,7 @@ class OilFilm(Law):
 
     def __init__(self, joint: str, seat: Seat, lift: Array, speed: float) -> None:
         self._joint, self._seat, self._lift, self._speed = joint, seat, lift, speed
-        self._past: tuple[float, float] | None = None
+        self._past: Past | None = None
 
     def screws(self, block: Block) -> Array:
         """Lift by the speed of the joint's turn."""
@@ -91,11 +91,7 @@ class OilFilm(Law):
         relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
         trace = np.einsum("nii->n", relative)
         turn = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
-        before, past = (block.time_s[0], turn[0]) if self._past is None else self._past
-        steps = np.diff(block.time_s, prepend=before)
-        moved = np.diff(turn, prepend=past)
-        rate = np.divide(moved, steps, out=np.zeros_like(moved), where=steps > 0.0)
-        self._past = float(block.time_s[-1]), float(turn[-1])
+        rate, self._past = rates(block.time_s, turn, self._past)
         home = np.concatenate([self._lift, np.zeros(3)])
         screw = self._seat.to_origin(block.rotation(self._joint)) @ home
         return at_component(
@@ -113,16 +109,12 @@ class SpinningTool(Law):
 
     def __init__(self, momentum: Array) -> None:
         self._momentum = momentum
-        self._past: tuple[float, Array] | None = None
+        self._past: Past | None = None
 
     def wrench(self, block: Block) -> Array:
         """Return what the rotor does to the platform while its axis turns."""
         now = block.configuration.platform @ self._momentum
-        before, past = (block.time_s[0], now[0]) if self._past is None else self._past
-        steps = np.diff(block.time_s, prepend=before)[:, None]
-        change = np.diff(now, axis=0, prepend=past[None])
-        self._past = float(block.time_s[-1]), now[-1]
-        rate = np.divide(change, steps, out=np.zeros_like(change), where=steps > 0.0)
+        rate, self._past = rates(block.time_s, now, self._past)
         return np.concatenate([np.zeros_like(rate), -rate], axis=-1)
 
 

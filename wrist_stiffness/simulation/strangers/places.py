@@ -15,8 +15,9 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross, dot
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
+from wrist_stiffness.simulation.laws.added_spring import Drive
 from wrist_stiffness.simulation.laws.joint_friction import joint_turn
-from wrist_stiffness.simulation.laws.law import Bending, Flowing, Law, at_component
+from wrist_stiffness.simulation.laws.law import Flowing, Law, at_component
 from wrist_stiffness.simulation.seat import Seat
 
 
@@ -58,27 +59,23 @@ class Dent(Law):
 
 
 @dataclass(frozen=True)
-class WornSector(Bending):
+class WornSector(Drive):
     """Motor's gear: soft under torque only at the motor angles where its teeth are worn.
 
     Thinner teeth bend more; the link turns on with the torque through its driven joint.
     """
 
-    component: str  # the driven joint
-    column: int  # number of its motor
-    axis: Array  # (3,), motor axis in F
+    column: int  # number of the motor
     softness: float  # turn per torque in the middle of the worn sector [rad/(N m)]
     # `at`, `width`: place and width of the sector on the motor's angle [rad]
     at: float
     width: float
 
-    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
-        """Turn about the motor axis."""
-        about = np.concatenate([np.zeros(3), self.axis])
+    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
+        """Turn as far as the teeth at this angle are worn."""
         theta = block.configuration.theta[:, self.column]
         soft = self.softness * np.exp(-0.5 * ((theta - self.at) / self.width) ** 2)
-        turn = (soft * (wrench @ about))[:, None] * about
-        return turn, soft[:, None, None] * np.outer(about, about)
+        return soft * torque, soft
 
 
 class _Switch:
