@@ -5,6 +5,9 @@ The comment says why a wrist with more than the largest magnitude would not work
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import (
@@ -16,15 +19,14 @@ from wrist_stiffness.mechanism.components import (
     Array,
 )
 from wrist_stiffness.mechanism.vectors import block_diagonal, screws_to_origin, unit
+from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.effect_entry import LEVER, Draw, effect
 from wrist_stiffness.simulation.laws.added_spring import (
+    Drive,
     MountSpring,
-    OneSidedDrive,
     OuterSpring,
-    StiffeningDrive,
     drive_flexibility,
 )
-from wrist_stiffness.simulation.laws.axis_misalignment import AxisMisalignment
 from wrist_stiffness.simulation.laws.bushing_polymer import (
     BushingHardening,
     Creep,
@@ -33,7 +35,7 @@ from wrist_stiffness.simulation.laws.bushing_polymer import (
 from wrist_stiffness.simulation.laws.cable_wrench import CableWrench
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
 from wrist_stiffness.simulation.laws.joint_play import FlangeGap, JointClearance
-from wrist_stiffness.simulation.laws.law import DRIVEN, JOINED, Law
+from wrist_stiffness.simulation.laws.law import DRIVEN, JOINED, BodyScrew, Law
 from wrist_stiffness.simulation.laws.load_sensor import (
     LoadBias,
     LoadMatrix,
@@ -41,14 +43,12 @@ from wrist_stiffness.simulation.laws.load_sensor import (
     turned_sensor,
 )
 from wrist_stiffness.simulation.laws.motor_turn import (
+    AheadOfEncoder,
     Backlash,
-    EccentricEncoder,
-    EncoderOffset,
-    TransmissionError,
 )
 from wrist_stiffness.simulation.laws.part_stiffness import EndHinge, UniformSoftness
 from wrist_stiffness.simulation.laws.point_mass import AddedMass, Inertia, MountingTilt
-from wrist_stiffness.simulation.laws.pose_sensor import Drift, MeasurementFrame, TargetMounting
+from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion, TargetMounting
 from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
 from wrist_stiffness.simulation.laws.time_delay import TimeDelay
 from wrist_stiffness.simulation.seat import Seat
@@ -86,13 +86,29 @@ def drive_compliance(d: Draw) -> Law:
     """Return a linear drive, a stiffening one, or one of which a flank is worn."""
     axis = d.table.geometry.axes[DRIVEN[d.component]]
     if d.form == "stiffening":
-        return StiffeningDrive(DRIVEN[d.component], axis, d.magnitude, 0.01)
+        return Drive(DRIVEN[d.component], axis, partial(_stiffening, d.magnitude))
     if d.form == "one_sided":
         lean = d.rng.choice((-1.0, 1.0)) * d.rng.uniform(0.2, 0.5)
         softness = d.magnitude * (1.0 + lean), d.magnitude * (1.0 - lean)
-        return OneSidedDrive(DRIVEN[d.component], axis, softness)
+        return Drive(DRIVEN[d.component], axis, partial(_one_sided, softness))
     axes = d.table.mechanism.a1, d.table.mechanism.a2
     return MountSpring(d.component, drive_flexibility(d.component, axes, d.magnitude))
+
+
+STIFFER = 0.01
+"""Torque at which a stiffening drive has half of its softness left [N m]."""
+
+
+def _stiffening(softness: float, block: Block, torque: Array) -> tuple[Array, Array]:
+    """Turn by a saturating logarithm: teeth touch more fully under torque."""
+    turn = softness * STIFFER * np.arcsinh(torque / STIFFER)
+    return turn, softness / np.sqrt(1.0 + (torque / STIFFER) ** 2)
+
+
+def _one_sided(softness: tuple[float, float], block: Block, torque: Array) -> tuple[Array, Array]:
+    """Turn by the softness of the flank that is loaded: of torques above 0, or below."""
+    own = np.where(torque > 0.0, *softness)
+    return own * torque, own
 
 
 # A bracket that gives 10 um at 1 N is seen to move by hand.
@@ -180,25 +196,43 @@ def backlash(d: Draw) -> Law:
 @effect(MOTORS, "rad", 2e-4, 0.02, 0.05)
 def encoder_offset(d: Draw) -> Law:
     """Return a wrong zero."""
-    return EncoderOffset(d.component, d.magnitude)
+    return AheadOfEncoder(d.component, lambda angle: np.full_like(angle, d.magnitude))
 
 
 # A disc of 20 mm that is 0.1 mm off its centre.
 @effect(MOTORS, "-", 2e-4, 5e-3, 0.05, ("once", "twice"))
 def encoder_eccentricity(d: Draw) -> Law:
-    """Return a disc off its centre, or oval."""
-    lobes = {"once": 1, "twice": 2}[d.form]
-    return EccentricEncoder(d.component, d.magnitude, d.rng.uniform(0.0, 2.0 * np.pi), lobes)
+    """Return a disc off its centre, or pressed oval, read by one head.
+
+    By exact geometry, not by its first harmonic; the magnitude is the offset of the disc's centre
+    over its radius.
+    """
+    lobes, phase = {"once": 1, "twice": 2}[d.form], d.rng.uniform(0.0, 2.0 * np.pi)
+
+    def ahead(angle: Array) -> Array:
+        at = lobes * angle + phase
+        return np.asarray(np.arctan2(d.magnitude * np.sin(at), 1.0 + d.magnitude * np.cos(at)))
+
+    return AheadOfEncoder(d.component, ahead)
 
 
 # Teeth of the worst grade.
 @effect(MOTORS, "rad", 1e-4, 2e-3, 0.02, ("single", "train"))
 def transmission_error(d: Draw) -> Law:
-    """Return one order or a row of harmonics."""
+    """Return one order, or harmonics of which each is half as high as the one before.
+
+    These are modulated once a turn by the gear's own run-out.
+    """
     count = 1 if d.form == "single" else 3
     orders = d.rng.integers(5, 25) * np.arange(1.0, count + 1.0)
     phases = d.rng.uniform(0.0, 2.0 * np.pi, count)
-    return TransmissionError(d.component, d.magnitude, orders, phases, 0.3 * (count > 1))
+    height = d.magnitude * 0.5 ** np.arange(count)
+
+    def ahead(angle: Array) -> Array:
+        waves = (height * np.sin(orders * angle[:, None] + phases)).sum(axis=-1)
+        return np.asarray(waves * (1.0 + 0.3 * (count > 1) * np.cos(angle)))
+
+    return AheadOfEncoder(d.component, ahead)
 
 
 # A bore that is 0.2 mm and 0.4 deg off is not assembled.
@@ -209,7 +243,7 @@ def axis_misalignment(d: Draw) -> Law:
     across = np.eye(3) - np.outer(axis, axis)
     shift, tilt = unit(across @ d.direction()), unit(across @ d.direction())
     local = d.magnitude * np.concatenate([shift, tilt / LEVER])
-    return AxisMisalignment(d.component, d.seat.to_origin(np.eye(3)) @ local)
+    return BodyScrew(d.component, d.seat.to_origin(np.eye(3)) @ local)
 
 
 # The polymer with the largest growth.
@@ -297,7 +331,7 @@ def load_point(d: Draw) -> Law:
 @effect(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
 def measurement_frame(d: Draw) -> Law:
     """Return a registration error of the sensor."""
-    return MeasurementFrame(d.twist())
+    return SensorMotion(d.twist())
 
 
 # Seen by eye.
@@ -310,8 +344,13 @@ def target_mounting(d: Draw) -> Law:
 # 0.1 mm in five minutes: the tripod is not fixed.
 @effect(("pose_sensor",), "m", 5e-6, 1e-4, 1e-2, ("linear", "settling", "daily"))
 def drift(d: Draw) -> Law:
-    """Return a drift that has its magnitude after 5 minutes."""
-    return Drift(d.twist(), 300.0, d.form)
+    """Return a drift that has its magnitude after 5 minutes, or a wave of four times that."""
+    shape: Callable[[Array], Array] = {
+        "linear": lambda x: x,
+        "settling": lambda x: np.expm1(-3.0 * x) / np.expm1(-3.0),
+        "daily": lambda x: np.sin(0.5 * np.pi * x),
+    }[d.form]
+    return SensorMotion(d.twist(), lambda block, rotation: shape(block.time_s / 300.0))
 
 
 # A tenth of a second is a dropped message.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,46 +29,19 @@ class MountSpring(Law):
 
 
 @dataclass(frozen=True)
-class Drive(Bending, ABC):
-    """Gears and coupling of a motor, which wind up about its axis."""
+class Drive(Bending):
+    """Gears and coupling of a motor, which wind up about its axis by a law of their own."""
 
     component: str  # driven joint
     axis: Array  # (3,), motor axis in F
-
-    @abstractmethod
-    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
-        """Return the turn (n,) [rad] under a torque (n,) [N m], and its slope (n,)."""
+    # torque (n,) [N m] to turn (n,) [rad] and its slope (n,)
+    wound: Callable[[Block, Array], tuple[Array, Array]]
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Turn about the motor axis."""
         about = np.concatenate([np.zeros(3), self.axis])
         turn, slope = self.wound(block, wrench @ about)
         return turn[:, None] * about, slope[:, None, None] * np.outer(about, about)
-
-
-@dataclass(frozen=True)
-class StiffeningDrive(Drive):
-    """Gears whose teeth touch more fully under torque: soft at first, then stiff."""
-
-    softness: float  # turn per torque at rest [rad/(N m)]
-    torque: float  # torque at which the softness has halved [N m]
-
-    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
-        """Turn by a saturating logarithm of the torque."""
-        turn = self.softness * self.torque * np.arcsinh(torque / self.torque)
-        return turn, self.softness / np.sqrt(1.0 + (torque / self.torque) ** 2)
-
-
-@dataclass(frozen=True)
-class OneSidedDrive(Drive):
-    """Gears of which one flank is worn: softer one way than the other."""
-
-    softness: tuple[float, float]  # turn per torque, of torques above 0 and below [rad/(N m)]
-
-    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
-        """Turn by the softness of the flank that is loaded."""
-        softness = np.where(torque > 0.0, *self.softness)
-        return softness * torque, softness
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.vectors import block_diagonal, cross
 from wrist_stiffness.simulation.block import Block
 
 if TYPE_CHECKING:
@@ -101,6 +104,36 @@ class Rubbing(Law, ABC):
         `state` was found with the friction `acting` (n, 2) in this joint; `give` (n, 3, 2, 2) is
         what a little more of it moves there.
         """
+
+
+@dataclass(frozen=True)
+class BodyScrew(Law):
+    """A screw at a component, fixed in the body that carries it."""
+
+    component: str
+    screw: Array  # (6,), at O with the wrist at home [m, rad]
+    share: Callable[[Block], Array] | None = None  # of it at each sample (n,); None for all
+
+    def screws(self, block: Block) -> Array:
+        """Turn it with its body."""
+        turned = block_diagonal(block.rotation(self.component)) @ self.screw
+        if self.share is not None:
+            turned = self.share(block)[:, None] * turned
+        return at_component(block, self.component, np.asarray(turned))
+
+
+@dataclass(frozen=True)
+class PlatformForce(Law):
+    """A force at a point of the platform."""
+
+    place: Array  # (3,), point in U [m]
+    force: Callable[[Block, Array], Array]  # force (n, 3) [N] where the point is, (n, 3), in F [m]
+
+    def wrench(self, block: Block) -> Array:
+        """Move it to O."""
+        at = block.configuration.platform @ self.place
+        force = self.force(block, at)
+        return np.concatenate([force, cross(at, force)], axis=-1)
 
 
 def no_screws(block: Block) -> Array:

@@ -1,7 +1,6 @@
 """Strangers of motion and time.
 
-A tool rings or spins, a pin floats on its oil or sinks in it; something bows, sways, swells or
-works loose.
+A tool rings or spins, a pin floats on its oil or sinks in it; something bows or works loose.
 """
 
 from __future__ import annotations
@@ -128,42 +127,6 @@ class ThermalBow(Law):
         """Move the platform with the frame."""
         kelvin = block.temperature_of("motor_1") - block.temperature_of("motor_2")
         return (kelvin * np.abs(kelvin))[:, None] * self.twist_per_kelvin
-
-
-@dataclass(frozen=True)
-class FloorTilt(Law):
-    """The carrier sways: the platform's weight has a direction that wanders."""
-
-    weight: float  # of platform and tool [N]
-    place: Array  # (3,), centre of gravity in U [m]
-    sway: Array  # (2, 3), two rotation vectors of the sway [rad]
-    periods_s: Array  # (2,) [s]
-
-    def wrench(self, block: Block) -> Array:
-        """Return the change of the weight."""
-        waves = np.sin(2.0 * np.pi * block.time_s[:, None] / self.periods_s)
-        down = np.array([0.0, 0.0, -self.weight])
-        force = cross(waves @ self.sway, np.broadcast_to(down, (len(waves), 3)))
-        at = block.configuration.platform @ self.place
-        return np.concatenate([force, cross(at, force)], axis=-1)
-
-
-@dataclass(frozen=True)
-class Swelling(Law):
-    """A bushing swells and dries with a humidity that nobody records."""
-
-    joint: str
-    screw: Array  # (6,), at O with the wrist at home at 1 [m, rad]
-    # `periods_s`, `phases`: (k,), of the humidity's waves [s], [rad]
-    periods_s: Array
-    phases: Array
-
-    def screws(self, block: Block) -> Array:
-        """Follow the humidity."""
-        angle = 2.0 * np.pi * block.time_s[:, None] / self.periods_s + self.phases
-        wet = np.sin(angle).mean(axis=-1)
-        turned = block_diagonal(block.rotation(self.joint)) @ self.screw
-        return at_component(block, self.joint, wet[:, None] * turned)
 
 
 class LooseningScrew(Bending):

@@ -1,7 +1,6 @@
 """Strangers that are somewhere, or jump there.
 
-A cable meets a stop, a bearing has a dent, a gear is worn; a seat has two places, a part yields, a
-sensor has two heads; an overload ring touches, a prism is met at an angle.
+A seat has two places, a part yields; an overload ring touches, a prism is met at an angle.
 """
 
 from __future__ import annotations
@@ -11,74 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross, dot
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.added_spring import Drive
-from wrist_stiffness.simulation.laws.joint_friction import joint_turn
-from wrist_stiffness.simulation.laws.law import Flowing, Law, at_component
-from wrist_stiffness.simulation.seat import Seat
+from wrist_stiffness.simulation.laws.law import Flowing, Law
 
 
-@dataclass(frozen=True)
-class CableStop(Law):
-    """Beyond a tilt to one side something soft touches the platform's rim."""
-
-    stiffness: float  # [N/m]
-    rim: Array  # (3,), point of the rim in U that is touched [m]
-    side: Array  # (3,), direction in F out of the stop, unit vector
-    depth: float  # coordinate of the rim along `side` below which it is touched [m]
-
-    def wrench(self, block: Block) -> Array:
-        """Push along `side`, more and more as the cable bunches."""
-        at = block.configuration.platform @ self.rim
-        dip = np.maximum(self.depth - at @ self.side, 0.0)
-        force = (self.stiffness * dip**1.5 / np.sqrt(1e-3))[:, None] * self.side
-        return np.concatenate([force, cross(at, force)], axis=-1)
-
-
-@dataclass(frozen=True)
-class Dent(Law):
-    """A dent or a chip lifts the pin over a few degrees of a passive joint's turn."""
-
-    joint: str  # passive joint
-    seat: Seat
-    lift: Array  # (3,), radial and tilting motion, as a translation at the outer ring [m]
-    # `at`, `width`: place and width on the turn from home [rad]
-    at: float
-    width: float
-
-    def screws(self, block: Block) -> Array:
-        """Lift where the dent passes."""
-        turn = joint_turn(block, self.joint, self.seat.axis)
-        shape = np.exp(-0.5 * ((turn - self.at) / self.width) ** 2)
-        home = self.lift @ self.seat.rings[0]
-        screw = shape[:, None] * (self.seat.to_origin(block.rotation(self.joint)) @ home)
-        return at_component(block, self.joint, screw)
-
-
-@dataclass(frozen=True)
-class WornSector(Drive):
-    """Motor's gear: soft under torque only at the motor angles where its teeth are worn.
-
-    Thinner teeth bend more; the link turns on with the torque through its driven joint.
-    """
-
-    column: int  # number of the motor
-    softness: float  # turn per torque in the middle of the worn sector [rad/(N m)]
-    # `at`, `width`: place and width of the sector on the motor's angle [rad]
-    at: float
-    width: float
-
-    def wound(self, block: Block, torque: Array) -> tuple[Array, Array]:
-        """Turn as far as the teeth at this angle are worn."""
-        theta = block.configuration.theta[:, self.column]
-        soft = self.softness * np.exp(-0.5 * ((theta - self.at) / self.width) ** 2)
-        return soft * torque, soft
-
-
-class _Switch:
+class Switch:
     """Two states; it changes where a signal leaves a band, and remembers."""
 
     def __init__(self, band: float) -> None:
@@ -103,7 +41,7 @@ class LooseSeat(Law):
 
     def __init__(self, jump: Array, lever: Array, threshold: float) -> None:
         self._jump, self._lever = jump, lever
-        self._switch = _Switch(threshold)
+        self._switch = Switch(threshold)
 
     def twist(self, block: Block, state: Equilibrium) -> Array:
         """Move the platform to the place of the moment's history."""
@@ -138,25 +76,6 @@ class PlasticSet(Flowing):
         if remember:
             self._worst = worst[-1]
         return bent[:, None] * (turn @ self._direction)
-
-
-class HeadChange(Law):
-    """The tracker sees the target with one of two heads, which do not quite agree.
-
-    `twist` (6,): of the second head against the first [m, rad]; `side` (3,): direction in F to
-    which the platform's normal leans when the second takes over; `normal` (3,): platform's normal
-    in U.
-    """
-
-    def __init__(self, twist: Array, side: Array, normal: Array) -> None:
-        self._twist, self._side, self._normal = twist, side, normal
-        self._switch = _Switch(0.05)
-
-    def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
-        """Move the pose where the second head looks."""
-        second = self._switch((rotation @ self._normal) @ self._side)
-        turn, move = exp_twist(second[:, None] * self._twist)
-        return turn @ rotation, (turn @ shift[..., None])[..., 0] + move
 
 
 @dataclass(frozen=True)
