@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from functools import partial
 from typing import Any
 
@@ -57,6 +57,7 @@ class AngleCorrector(WristNode):
     """
 
     stream: CorrectionStream
+    settings_of = staticmethod(correction_settings)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("angle_corrector", CORRECTION, **options)
@@ -77,10 +78,6 @@ class AngleCorrector(WristNode):
         stream = CorrectionStream(None, settings, self.get_parameter("enabled_on_start").value)
         stream.active = False
         return stream
-
-    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
-        """Check parameters and return the settings that they stand for."""
-        return correction_settings(values)
 
     def make_inputs(self) -> None:
         """Listen to commands, in every state but the last: see `inactive_commands`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -93,6 +93,7 @@ class PoseErrorPredictor(WristNode):
     """Publishes `/pose_error_predicted`; nothing for a sample that cannot be predicted."""
 
     stream: PredictionStream
+    settings_of = staticmethod(prediction_settings)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)
@@ -114,10 +115,6 @@ class PoseErrorPredictor(WristNode):
     def make_stream(self, settings: StreamSettings) -> PredictionStream:
         """Return the prediction stream."""
         return PredictionStream(None, settings)
-
-    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
-        """Check parameters and return the settings that they stand for."""
-        return prediction_settings(values)
 
     def make_inputs(self) -> None:
         """Listen to the motors."""

@@ -9,8 +9,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.simulation.laws.joint_play import FlangeGap
-from wrist_stiffness.simulation.laws.law import BodyScrew, Law
-from wrist_stiffness.simulation.laws.load_sensor import LoadMatrix
+from wrist_stiffness.simulation.laws.law import BodyScrew, Law, LoadReading
 from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness
 from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion, TargetMounting
 from wrist_stiffness.simulation.seat import Seat
@@ -45,7 +44,7 @@ def base_laws(name: str, table: Table, seed: int, session: int) -> list[Law]:
         *softer,
         *axes,
         *_shims(table, axes),
-        LoadMatrix(scale * np.eye(6)),
+        LoadReading(lambda block, wrench: scale * wrench),
         TargetMounting(turn * day.uniform(-1.0, 1.0, 6)),
         SensorMotion(turn * day.uniform(-1.0, 1.0, 6)),
     ]

@@ -13,7 +13,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import angles_text, first_where
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.base import base_laws
-from wrist_stiffness.simulation.block import Past, rates, taken
+from wrist_stiffness.simulation.block import Rate, taken
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.drive import Drive
 from wrist_stiffness.simulation.exact import ExactWrist
@@ -135,7 +135,7 @@ class VirtualCell:
         self._static = pose_sensor.static
         self._view = PoseView(settings.sees, settings.lost_beams, view_rng)
         self._drive = Drive(table.geometry.limits.encoder_step, drive_rng)
-        self._departed: Past | None = None
+        self._departs = Rate()
         self._load_noise = NoiseSource(sensor.force, sensor.moment, load_rng)
         self._pose_noise = NoiseSource(pose_sensor.shift, pose_sensor.rotation, pose_rng)
 
@@ -213,8 +213,7 @@ class VirtualCell:
         What an encoder counts wrong is so small a part of a speed that it is left out.
         """
         departure = sent - self.desired(time_s)
-        rate, self._departed = rates(time_s, departure, self._departed)
-        speed = self.program.speed(time_s) + rate
+        speed = self.program.speed(time_s) + self._departs(time_s, departure)
         for law in self._laws:
             speed = law.read_speed(time_s, speed)
         return self._drive.tell(speed)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.law import Contribution, Law
 from wrist_stiffness.model.parameters import (
@@ -102,7 +103,10 @@ class LoadCrossTalk(Law):
         return Contribution(wrench=-at.load @ shares.T)
 
 
-TURN_BASE, TURN_PLATFORM = "base_{}_mdeg", "platform_{}_mdeg"
+def fixed_in_both(at: Situation, values: Mapping[str, float], unit: str) -> Array:
+    """Return the sum of a vector fixed in F and one fixed in U, in F, (n, 3)."""
+    base, platform = (vector(values, f"{body}_{{}}_{unit}") for body in ("base", "platform"))
+    return base + at.body("platform") @ platform
 
 
 class LoadMisalignment(Law):
@@ -116,18 +120,15 @@ class LoadMisalignment(Law):
     excited_by = "loads of several directions at several poses"
     inexactness = 0.0
     own = (
-        *symmetric_vector(TURN_BASE, 1e4, 500.0),
-        *symmetric_vector(TURN_PLATFORM, 1e4, 500.0),
+        *symmetric_vector("base_{}_mdeg", 1e4, 500.0),
+        *symmetric_vector("platform_{}_mdeg", 1e4, 500.0),
     )
 
     def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return true minus said."""
-        turn = vector(values, TURN_BASE) + at.body("platform") @ vector(values, TURN_PLATFORM)
+        turn = fixed_in_both(at, values, "mdeg")
         halves = cross(turn, at.load[:, :3]), cross(turn, at.load[:, 3:])
         return Contribution(wrench=np.concatenate(halves, axis=1))
-
-
-LEVER_BASE, LEVER_PLATFORM = "base_{}_mm", "platform_{}_mm"
 
 
 class LoadPoint(Law):
@@ -141,13 +142,13 @@ class LoadPoint(Law):
     excited_by = "forces of several directions at several poses"
     inexactness = 0.0
     own = (
-        *symmetric_vector(LEVER_BASE, 1000.0, 2.0),
-        *symmetric_vector(LEVER_PLATFORM, 1000.0, 2.0),
+        *symmetric_vector("base_{}_mm", 1000.0, 2.0),
+        *symmetric_vector("platform_{}_mm", 1000.0, 2.0),
     )
 
     def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the missing moment."""
-        lever = vector(values, LEVER_BASE) + at.body("platform") @ vector(values, LEVER_PLATFORM)
+        lever = fixed_in_both(at, values, "mm")
         wrench = np.zeros_like(at.load)
         wrench[:, 3:] = cross(lever, at.load[:, :3])
         return Contribution(wrench=wrench)

@@ -22,8 +22,10 @@ class Law:
     """One departure of the true wrist from its base.
 
     Hooks are called once for each block, in the order of time and in the order in which they stand
-    here.  A law with a history advances it in the hook that ends with "and remember".  What hangs
-    on the forces inside the wrist is found together with them: `Bending`, `Flowing`, `Rubbing`.
+    here.  A law with a history advances it in the hook that ends with "and remember"; a copy of the
+    law has a history of its own (so a function that remembers is a `partial` of its memory).  What
+    hangs on the forces inside the wrist is found together with them: `Bending`, `Flowing`,
+    `Rubbing`.
     """
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
@@ -107,6 +109,17 @@ class Rubbing(Law, ABC):
 
 
 @dataclass(frozen=True)
+class LoadReading(Law):
+    """A load sensor that reads another wrench."""
+
+    said: Callable[[Block, Array], Array]  # what it says instead of a wrench, (n, 6)
+
+    def read_load(self, block: Block, wrench: Array) -> Array:
+        """Read it."""
+        return self.said(block, wrench)
+
+
+@dataclass(frozen=True)
 class BodyScrew(Law):
     """A screw at a component, fixed in the body that carries it."""
 
@@ -120,6 +133,17 @@ class BodyScrew(Law):
         if self.share is not None:
             turned = self.share(block)[:, None] * turned
         return at_component(block, self.component, np.asarray(turned))
+
+
+@dataclass(frozen=True)
+class PlatformMotion(Law):
+    """A motion of the whole platform besides what the limbs let it do."""
+
+    moved: Callable[[Block, Equilibrium], Array]  # its twist, (n, 6) at O in F [m, rad]
+
+    def twist(self, block: Block, state: Equilibrium) -> Array:
+        """Move the platform."""
+        return self.moved(block, state)
 
 
 @dataclass(frozen=True)

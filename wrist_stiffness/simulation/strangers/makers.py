@@ -5,30 +5,36 @@ The comment says why a wrist with more than the largest magnitude would not work
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import JOINTS, LINKS, MOTORS, PASSIVE_JOINTS, Array
-from wrist_stiffness.mechanism.vectors import cross, screws_to_origin, unit
-from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.mechanism.vectors import block_diagonal, cross, dot, screws_to_origin, unit
+from wrist_stiffness.simulation.block import Block, Rate
 from wrist_stiffness.simulation.effect_entry import Draw, effect
-from wrist_stiffness.simulation.laws.added_spring import Drive
+from wrist_stiffness.simulation.equilibrium import Equilibrium
+from wrist_stiffness.simulation.laws.drive import Drive
 from wrist_stiffness.simulation.laws.joint_friction import joint_turn
-from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, BodyScrew, Law, PlatformForce
+from wrist_stiffness.simulation.laws.law import (
+    DRIVEN,
+    JOINED,
+    MOTOR,
+    BodyScrew,
+    Law,
+    LoadReading,
+    PlatformForce,
+    PlatformMotion,
+)
 from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion
 from wrist_stiffness.simulation.makers import spring
-from wrist_stiffness.simulation.strangers.motion import (
+from wrist_stiffness.simulation.strangers.histories import (
     LooseningScrew,
-    OilFilm,
+    PlasticSet,
+    PrismIncidence,
     Resonance,
     SpinningTool,
     SqueezeFilm,
-    ThermalBow,
-)
-from wrist_stiffness.simulation.strangers.places import (
-    LooseSeat,
-    OverloadRing,
-    PlasticSet,
-    PrismIncidence,
     Switch,
 )
 
@@ -48,16 +54,35 @@ def resonance(d: Draw) -> Law:
 # Thicker than the clearance of any bearing of this size.
 @effect(PASSIVE_JOINTS, "m", 3e-6, 5e-5, 1e-3)
 def oil_film(d: Draw) -> Law:
-    """Return a floating pin."""
-    lift = d.magnitude * unit(np.cross(d.seat.axis, d.direction()))
-    return OilFilm(d.component, d.seat, lift, 0.3)
+    """Return a turning pin that floats up on its lubricant, away from the groove that feeds it.
+
+    At 0.3 rad/s three quarters of the lift are there.
+    """
+    seat = d.seat
+    lift = np.append(d.magnitude * unit(np.cross(seat.axis, d.direction())), np.zeros(3))
+    inner, outer = JOINED[d.component]
+
+    def share(rate: Rate, block: Block) -> Array:
+        bodies = block.configuration.rotations
+        trace = np.einsum("nij,nij->n", bodies[inner], bodies[outer])
+        turn = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+        return np.tanh(np.abs(rate(block.time_s, turn)) / 0.3)
+
+    return BodyScrew(d.component, screws_to_origin(seat.centre) @ lift, partial(share, Rate()))
 
 
 # 0.1 mm of play rattles.
 @effect(("platform",), "m", 5e-6, 1e-4, 1e-3)
 def loose_seat(d: Draw) -> Law:
-    """Return two seats."""
-    return LooseSeat(d.twist(), d.direction(), 0.004)
+    """Return two seats of the tool; a moment beyond 4 mN m throws it into the other one."""
+    jump, lever = d.twist(), d.direction()
+
+    def thrown(switch: Switch, block: Block, state: Equilibrium) -> Array:
+        platform = block.configuration.platform
+        moment = np.einsum("nji,nj->ni", platform, block.load[:, 3:]) @ lever
+        return switch(moment)[:, None] * (block_diagonal(platform) @ jump)
+
+    return PlatformMotion(partial(thrown, Switch(0.004)))
 
 
 # 0.1 mm at 1 N is a broken bushing.
@@ -79,8 +104,11 @@ def head_change(d: Draw) -> Law:
     """
     normal = d.table.mechanism.n0
     twist, side = d.twist(), unit(np.cross(d.direction(), normal))
-    second = Switch(0.05)
-    return SensorMotion(twist, lambda block, rotation: second((rotation @ normal) @ side))
+
+    def second(switch: Switch, block: Block, rotation: Array) -> Array:
+        return switch((rotation @ normal) @ side)
+
+    return SensorMotion(twist, partial(second, Switch(0.05)))
 
 
 # A wall.
@@ -116,8 +144,14 @@ def dent(d: Draw) -> Law:
 # 0.2 mm for one kelvin.
 @effect(("frame",), "m/K^2", 2e-5, 2e-4, 1e-2)
 def thermal_bow(d: Draw) -> Law:
-    """Return a bow in a random direction."""
-    return ThermalBow(d.twist())
+    """Return a bow by the square of the difference in temperature between the two motors."""
+    per_kelvin = d.twist()
+
+    def bowed(block: Block, state: Equilibrium) -> Array:
+        kelvin = block.temperature_of("motor_1") - block.temperature_of("motor_2")
+        return (kelvin * np.abs(kelvin))[:, None] * per_kelvin
+
+    return PlatformMotion(bowed)
 
 
 # 11 deg: the wrist falls over.
@@ -192,9 +226,23 @@ def squeeze_film(d: Draw) -> Law:
 # Of nine tenths hardly anything is left to measure, and more than all cannot go past.
 @effect(("load_sensor",), "-", 0.3, 0.9, 1.0)
 def overload_ring(d: Draw) -> Law:
-    """Return a ring about the plate that touches far below the rated force."""
-    plate = d.table.geometry.platform.centre
-    return OverloadRing(d.magnitude, d.table.mechanism.n0, plate, d.rng.uniform(0.05, 0.15))
+    """Return a ring about the plate that touches far below the rated side force.
+
+    Chips fill most of its gap; what then goes through the ring goes past the strain gauges: the
+    magnitude is the share of what is beyond the limit.
+    """
+    normal, centre = d.table.mechanism.n0, d.table.geometry.platform.centre
+    limit = d.rng.uniform(0.05, 0.15)
+
+    def without_ring(block: Block, wrench: Array) -> Array:
+        platform, force = block.configuration.platform, wrench[:, :3]
+        across, at = platform @ normal, platform @ centre
+        side = force - dot(force, across)[:, None] * across
+        size = np.maximum(np.sqrt(dot(side, side)), limit)
+        past = (d.magnitude * (1.0 - limit / size))[:, None] * side
+        return wrench - np.concatenate([past, cross(at, past)], axis=-1)
+
+    return LoadReading(without_ring)
 
 
 # The glass of the common half-inch prism is 9 mm deep.
