@@ -59,11 +59,13 @@ def main() -> None:
 
     scaled = {name: arguments.coarser * size for name, size in asdict(SHIPPED_SIZES).items()}
     sizes = MeshSettings(**scaled)
+    start = time.perf_counter()
     components, provenance = elastic_components(geometry, sizes)
+    coarser_s = time.perf_counter() - start
     count = sum(provenance.elements.values())
     row(
         f"condensation, {arguments.coarser:g} x coarser",
-        f"{provenance.seconds:.1f} s, {count} elements",
+        f"{coarser_s:.1f} s, {count} elements",
     )
 
     rng = np.random.default_rng(1)

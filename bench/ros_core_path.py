@@ -13,10 +13,10 @@ from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction import Correction, correct, residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.objective import Objective
-from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.lookup.response import respond
+from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.ros.stream_messages import (

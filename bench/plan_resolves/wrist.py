@@ -16,7 +16,7 @@ from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
 from wrist_stiffness.simulation.program import Program, Track
-from wrist_stiffness.simulation.size import residual
+from wrist_stiffness.simulation.size import base_pose, departure
 
 RATE_HZ = 5.0
 PACE = Pace(float(np.radians(30.0)), 2.0, in_motion=False)
@@ -94,7 +94,9 @@ def _measured(timeline: Timeline, hidden: HiddenEffect | None) -> np.ndarray:
     still = Track(np.array([0.0, times[-1]]), np.zeros((2, 1)))
     cell.program = Program(Track(times, angles), Track(times, loads), still, times[-1] + 1.0)
     time_s = np.arange(0.0, times[-1], 1.0 / RATE_HZ)
-    found = residual(TABLE, cell.run(time_s, cell.desired(time_s)))
+    sample = cell.run(time_s, cell.desired(time_s))
+    base = base_pose(TABLE, sample.encoder, sample.wrench)
+    found = departure(sample.measured_rotation, sample.measured_shift, base)
     out = np.zeros((len(timeline.block), 6))
     for row in timeline.rows:
         until = timeline.block.time[row]

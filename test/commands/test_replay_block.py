@@ -138,7 +138,7 @@ def wanted(path, settings):
                     stream.temperatures.add("link_1", int(stamps[heard]), 20.0 + 0.01 * heard)
             heard += 1
         try:
-            found = predicting.on_joint_state(stamp_ns, MOTORS, angles, speeds(i)).prediction
+            found = predicting.on_joint_state(stamp_ns, MOTORS, angles, speeds(i))
             payload = error_payload(stamp_ns, found.twist, found.covariance)
             sent["/pose_error_predicted"].append(payload)
             s_um, mdeg = 1e6 * found.twist[:3], 1e3 * float(np.degrees(1.0)) * found.twist[3:]

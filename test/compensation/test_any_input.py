@@ -122,7 +122,7 @@ def answers_of(model, messages):
                     stream.covariates.add(frame, stamp, first)
         if kind == "joints":
             with contextlib.suppress(WristError):
-                prediction = predicting.on_joint_state(stamp, first, second, speeds).prediction
+                prediction = predicting.on_joint_state(stamp, first, second, speeds)
                 came("predicted", prediction.twist, prediction.covariance)
             with contextlib.suppress(WristError):
                 sent = correcting.on_command(stamp, frame, first, second, speeds)

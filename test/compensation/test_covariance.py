@@ -89,8 +89,8 @@ def test_a_stream_adds_the_loads_covariance_where_it_is_told_the_noise(exact):
     for noise in (None, NOISE):
         stream = PredictionStream(exact, StreamSettings(frames=Frames(), load_noise=noise))
         stream.loads.add(1, "wrist_base", DOWN[:3], DOWN[3:])
-        sample = stream.on_joint_state(1, ("motor_1_joint", "motor_2_joint"), THETA)
-        covariances.append(sample.prediction.covariance)
+        prediction = stream.on_joint_state(1, ("motor_1_joint", "motor_2_joint"), THETA)
+        covariances.append(prediction.covariance)
     added = load_covariance(exact, exact.predict(THETA, Load(DOWN)), Load(DOWN), NOISE)
     assert np.allclose(covariances[1] - covariances[0], added, rtol=1e-9)
 
@@ -159,7 +159,7 @@ def test_parameters_encoder_and_load_together_spread_as_a_stream_states(exact):
         stamp = round((1.0 + time) * 1e9)
         stream.loads.add(stamp, "wrist_base", DOWN[:3], DOWN[3:])
         names = ("motor_1_joint", "motor_2_joint")
-        shown = stream.on_joint_state(stamp, names, [first, -0.2]).prediction
+        shown = stream.on_joint_state(stamp, names, [first, -0.2])
     step = exact.table.geometry.limits.encoder_step
     found = []
     for _ in range(EFFECT_DRAWS):

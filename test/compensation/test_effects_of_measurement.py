@@ -106,7 +106,7 @@ def test_the_corrector_sends_the_same_with_an_effect_of_measurement(shipped, cel
         said = []
         for each in (stream, plain):
             each.loads.add(stamp, "wrist_base", load[:3].tolist(), load[3:].tolist())
-            said.append(each.on_joint_state(stamp, MOTORS, theta.tolist()).prediction.measured)
+            said.append(each.on_joint_state(stamp, MOTORS, theta.tolist()).measured)
         seen = max(seen, float(np.abs(said[0] - said[1]).max()))
     assert seen > 1e-7
 

@@ -47,7 +47,7 @@ def predict_all(stream, stamps, thetas):
     twists = []
     for stamp, theta in zip(stamps, thetas, strict=True):
         stream.loads.add(stamp, "wrist_base", DOWN[:3], DOWN[3:])
-        twists.append(stream.on_joint_state(stamp, NAMES, theta).prediction.twist)
+        twists.append(stream.on_joint_state(stamp, NAMES, theta).twist)
     return np.array(twists)
 
 
@@ -192,7 +192,7 @@ def test_speeds_are_used_where_given_and_else_differences(model, speedy, names, 
         angles = [first, 0.0] if names == NAMES else [0.0, first]
         for stream in (predicting, correcting, monitoring):
             stream.loads.add(stamp, "wrist_base", DOWN[:3], DOWN[3:])
-        predicted = predicting.on_joint_state(stamp, names, angles, speeds).prediction
+        predicted = predicting.on_joint_state(stamp, names, angles, speeds)
         monitoring.on_joint_state(stamp, names, angles, speeds)
         residual = monitoring.on_pose(stamp, "wrist_base", shift, quaternion).residual
         correcting.enabled = stamp > SECOND

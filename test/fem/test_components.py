@@ -129,8 +129,6 @@ def test_gaps_are_the_geometrys(make_wrist, coarse):
     np.testing.assert_array_equal(components.contact["joint_2"].gap, np.full(16, 20e-6))
     np.testing.assert_array_equal(components.contact["joint_3"].gap, np.full(8, 5e-6))
     assert provenance.elements["joint_3"] < provenance.elements["joint_2"]
-    assert provenance.interface == "rigid"
-    assert provenance.seconds > 0
     assert provenance.packages["netgen-mesher"]
 
 
@@ -143,8 +141,7 @@ def test_progress_names_every_part(make_wrist, coarse):
 
 def test_distributing_walls_soften_every_part_in_every_direction(skewed_components, coarse):
     geometry, rigid = skewed_components
-    distributing, provenance = elastic_components(geometry, coarse, interface="distributing")
-    assert provenance.interface == "distributing"
+    distributing, _ = elastic_components(geometry, coarse, interface="distributing")
     for softer, stiffer in zip(distributing.flexibility, rigid.flexibility, strict=True):
         scale = np.sqrt(np.diag(stiffer))
         assert np.linalg.eigvalsh((softer - stiffer) / np.outer(scale, scale))[0] > 0

@@ -7,14 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.compiled import CompiledWrist, mechanism_constants, native
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.kinematics import Mechanism
-from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, pose_of_twist
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model

@@ -12,9 +12,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from wrist_stiffness.compensation.correction import correct
 from wrist_stiffness.compensation.objective import Objective
-from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.trajectory_plan import STEP as DIFFERENCE_RAD
 from wrist_stiffness.lookup.table_file import save_table
+from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import save_model

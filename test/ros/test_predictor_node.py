@@ -8,7 +8,7 @@ from sensor_msgs.msg import Temperature
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from wrist_stiffness.compensation.pose import pose_of_twist
+from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import save_model

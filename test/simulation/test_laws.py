@@ -333,11 +333,16 @@ def test_a_wrist_that_grows_as_a_whole_only_carries_its_plate_outward(wrist):
 def test_load_point_is_undone_by_moving_the_moment_back(form, wrist):
     table = wrist()
     law = build(HiddenEffect("load_point", "load_sensor", form, 0.01, 8), table)
+    home = state_at(table, [], np.zeros((3, 2)), np.zeros((3, 6))).block
+    # Of unit forces along x, y and z it reads the moments e x point.
+    moments = law.read_load(home, np.eye(3, 6))[:, 3:]
+    point = -0.5 * np.cross(np.eye(3), moments).sum(axis=0)
+    assert np.linalg.norm(point) == pytest.approx(0.01)
     wrench = np.array([[0.3, -0.5, 0.2, 0.01, 0.02, -0.03]])
     block = block_of(table, 1)
     read = law.read_load(block, wrench)
-    point = law.point if form == "frame" else block.configuration.platform[0] @ law.point
-    assert np.linalg.norm(law.point) == pytest.approx(0.01)
+    if form == "platform":
+        point = block.configuration.platform[0] @ point
     np.testing.assert_allclose(read[0, 3:] + np.cross(point, read[0, :3]), wrench[0, 3:])
     assert np.array_equal(read[:, :3], wrench[:, :3])
 

@@ -12,7 +12,7 @@ from wrist_stiffness.simulation.blind import draw
 from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, is_plausible
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
-from wrist_stiffness.simulation.size import Scale, magnitude_for, residual
+from wrist_stiffness.simulation.size import Scale, base_pose, departure, magnitude_for
 
 SECONDS, RATE = 20.0, 20.0
 SETTINGS = CellSettings(rate_hz=RATE, program_seconds=SECONDS)
@@ -54,6 +54,12 @@ def measured_size(table, hidden, settings):
         covariance[3:, 3:] += jacobian[i] @ jacobian[i].T * step**2 / 12.0
         total += xi[i] @ np.linalg.solve(covariance, xi[i]) / 6.0
     return np.sqrt(total / np.count_nonzero(counted))
+
+
+def residual(table, sample):
+    """Return what the base leaves of measured poses, (n, 6) [m, rad]."""
+    base = base_pose(table, sample.encoder, sample.wrench)
+    return departure(sample.measured_rotation, sample.measured_shift, base)
 
 
 @pytest.fixture(scope="module")

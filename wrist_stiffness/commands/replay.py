@@ -15,12 +15,12 @@ from wrist_stiffness.commands.replay_summary import ReplaySummary
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import RecordingError, WristError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording.cdr import decode
@@ -202,10 +202,9 @@ def _predict(
     summary: ReplaySummary,
 ) -> Iterator[tuple[str, Message | bytes]]:
     summary.joint_states += 1
-    sample = predicting.on_joint_state(
+    prediction = predicting.on_joint_state(
         state.header.stamp_ns, state.name, state.position, state.velocity
     )
-    prediction = sample.prediction
     summary.predictions += 1
     summary.warnings.update((*prediction.warnings, *predicting.dropped_signals))
     summary.shift_um.add(np.array([prediction.shift_norm * MICROMETRES]))

@@ -19,11 +19,11 @@ from wrist_stiffness.commands.replay_summary import ReplaySummary
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.commands.wrist_drawing import Drawings
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
+from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.channel import channel_of

@@ -10,11 +10,11 @@ import numpy as np
 
 from wrist_stiffness.compensation.correction import Correction
 from wrist_stiffness.compensation.measured_pose import NOT_MEASURED
-from wrist_stiffness.compensation.pose import seen_from
 from wrist_stiffness.compensation.trajectory_plan import PlannedPoint
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.mechanism.compiled import Flags
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.vectors import screws_to_origin
 
 
 class CorrectedCommand(NamedTuple):
@@ -113,6 +113,6 @@ def _left(
     doubt = (0.0 if valid else NOT_MEASURED) * np.eye(6)
     found = [(twist, covariance + doubt)]
     if tool_point.any():
-        there = seen_from(platform @ tool_point)
+        there = screws_to_origin(-platform @ tool_point)
         found.append((there @ twist, there @ covariance @ there.T + doubt))
     return found

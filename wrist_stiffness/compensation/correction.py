@@ -56,26 +56,13 @@ def correct(
     `play`.  For most effects that is the same as a hysteresis of the correction; but the error of a
     motor with backlash at its reversal grows from nothing, while the correction must jump.
 
-    Parameters
-    ----------
-    predict : callable
-        The pose error at motor angles (2,) [rad], under the load of the moment.  A load in F stays
-        fixed while the angles are iterated, one in U turns with them.
-    workspace : Workspace
-        The rigid wrist and the table's domain.
-    command : (2,) float
-        Commanded motor angles [rad].
-    held : (2,) float, optional
-        The correction so far; zero if None [rad].
-    play : float
-        What a motor may leave before its correction moves [rad].
-
-    Raises
-    ------
-    UnreachablePoseError, SingularPoseError, LoadRangeError
-        If the command or the corrected angles are outside the table's domain or load range.
-    InputError
-        If the fixed point is not reached.
+    `predict`: the pose error at motor angles (2,) [rad], under the load of the moment; a load in F
+    stays fixed while the angles are iterated, one in U turns with them.  `workspace`: the rigid
+    wrist and the table's domain.  `command` (2,): commanded motor angles [rad].  `held` (2,): the
+    correction so far; zero if None [rad].  `play`: what a motor may leave before its correction
+    moves [rad].  Raises `UnreachablePoseError`, `SingularPoseError` or `LoadRangeError` if the
+    command or the corrected angles are outside the table's domain or load range; `InputError` if
+    the fixed point is not reached.
     """
     desired = workspace.configuration(command)
     jacobian = workspace.mechanism.jacobian(desired)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,16 +103,6 @@ class Stream:
         return self._running
 
 
-class PredictedSample(NamedTuple):
-    """Prediction for one joint state."""
-
-    # `stamp_ns`, `load_stamp_ns`: stamps of the joint state and of the load that belonged to it
-    # [ns]
-    stamp_ns: int
-    load_stamp_ns: int
-    prediction: Prediction  # the pose error
-
-
 @dataclass(frozen=True)
 class PredictedBlock:
     """Predictions for n joint states."""
@@ -139,18 +128,18 @@ class PredictionStream(Stream):
         names: Sequence[str],
         positions: Sequence[float],
         velocities: Sequence[float] = (),
-    ) -> PredictedSample:
+    ) -> Prediction:
         """Predict for a joint state.
 
         `stamp_ns`: its stamp [ns]; `names`, `positions`, `velocities`: as in
         sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are taken as
-        differences of the angles.  Gives `PredictedSample`: to be published with the joint state's
+        differences of the angles.  Gives the pose error, to be published with the joint state's
         stamp.  Raises `WristError` if the sample, the pose or the load cannot be used: nothing is
         to be published.
         """
         motors = self.settings.motors
         theta, theta_dot = motors.angles(names, positions), motors.speeds(names, velocities)
-        load_stamp_ns, load = self.loads.at(stamp_ns)
+        _, load = self.loads.at(stamp_ns)
         running = self.running_model()
         prediction = running.advance(stamp_ns, theta, load, theta_dot)
         if self.settings.load_noise is not None:
@@ -158,7 +147,7 @@ class PredictionStream(Stream):
             if prediction.added_covariance is not None:
                 added = added + prediction.added_covariance
             prediction = replace(prediction, added_covariance=added)
-        return PredictedSample(stamp_ns, load_stamp_ns, prediction)
+        return prediction
 
     @property
     def in_blocks(self) -> bool:
@@ -197,7 +186,7 @@ class PredictionStream(Stream):
             speeds = () if theta_dot is None else theta_dot[place].tolist()
             angles = theta[place].tolist()
             try:
-                one = self.on_joint_state(int(stamps[place]), names, angles, speeds).prediction
+                one = self.on_joint_state(int(stamps[place]), names, angles, speeds)
             except WristError as error:
                 found.faults[place] = error
                 continue

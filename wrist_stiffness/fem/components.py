@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -40,12 +39,9 @@ PartProgress = Callable[[int, int, str], None]
 class Provenance:
     """How elastic components were made."""
 
-    interface: str  # `rigid`, `distributing` or `sliding`
-    sizes: MeshSettings  # element sizes [m]
     # `nodes`, `elements`: by component; equal parts share one mesh
     nodes: dict[str, int]
     elements: dict[str, int]
-    seconds: float  # wall time of the whole condensation [s]
     packages: dict[str, str]  # versions
 
 
@@ -66,7 +62,6 @@ def elastic_components(
     """
     if interface not in INTERFACES:
         raise InputError(f"interface model '{interface}' is not one of {', '.join(INTERFACES)}")
-    start = time.perf_counter()
     parts = wrist_parts(geometry, rings)
     condensed: dict[Solid, CondensedSolid] = {}
     for done, part in enumerate(parts):
@@ -77,11 +72,8 @@ def elastic_components(
     if progress is not None:
         progress(len(parts), len(parts), "done")
     provenance = Provenance(
-        interface=interface,
-        sizes=sizes,
         nodes={part.name: condensed[part.solid].nodes for part in parts},
         elements={part.name: condensed[part.solid].elements for part in parts},
-        seconds=time.perf_counter() - start,
         packages={package: version(package) for package in PACKAGES},
     )
     elements = {solid: kept.element for solid, kept in condensed.items()}

@@ -28,7 +28,7 @@ from wrist_stiffness.mechanism.geometry import (
     LinkDimensions,
 )
 from wrist_stiffness.mechanism.material import AnyMaterial
-from wrist_stiffness.mechanism.vectors import skew
+from wrist_stiffness.mechanism.vectors import screws_to_origin, wrenches_to_origin
 
 RINGS = 2
 """Contact modes over the width of a flange; what more would change is stated by each table."""
@@ -44,22 +44,12 @@ class Placement:
     @property
     def screw(self) -> Array:
         """Screws at the part's origin in its axes to screws at O in F (6, 6)."""
-        return np.block(
-            [
-                [self.rotation, skew(self.origin) @ self.rotation],
-                [np.zeros((3, 3)), self.rotation],
-            ]
-        )
+        return screws_to_origin(self.origin, self.rotation)
 
     @property
     def wrench(self) -> Array:
         """Wrenches at the part's origin in its axes to wrenches at O in F (6, 6)."""
-        return np.block(
-            [
-                [self.rotation, np.zeros((3, 3))],
-                [skew(self.origin) @ self.rotation, self.rotation],
-            ]
-        )
+        return wrenches_to_origin(self.origin, self.rotation)
 
     def turned(self, rotation: Array) -> Placement:
         """Turn with a body about O by a rotation (3, 3) in F."""

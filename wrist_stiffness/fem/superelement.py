@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import qr
 
 from wrist_stiffness.fem.elasticity import cylindrical_axes, rigid_motion, surface_integrals
 from wrist_stiffness.fem.factor import CyclicFactor, Factor, factorise, factorise_cyclic
@@ -163,8 +164,8 @@ def _condense_distributing(
     all_loads = np.hstack([platform, loads])
     balanced = all_loads - motor @ (rigid.T @ all_loads)
     # Balanced loads need no support: any six unknowns that stop the rigid motion will do.
-    fixed = _determinate_support(nodes)
-    free = np.setdiff1d(np.arange(3 * len(nodes)), fixed)
+    _, _, first = qr(rigid.T, mode="economic", pivoting=True)
+    free = np.setdiff1d(np.arange(3 * len(nodes)), first[:6])
     displacement = np.zeros_like(all_loads)
     displacement[free] = factorise(body.stiffness[free][:, free], free).solve(balanced[free])
     # Balanced loads do no work on the rigid motion that is left in these displacements.
@@ -192,21 +193,6 @@ def _wall_average(body: ElasticBody, wall: str) -> Array:
     spread = moments.reshape(-1, 6)
     gram = rigid_motion(body.mesh.nodes).T @ spread
     return spread @ np.asarray(np.linalg.inv(gram), dtype=np.float64)
-
-
-def _determinate_support(nodes: Array) -> Array:
-    """Six unknowns at three far nodes whose removal stops every rigid motion."""
-    first = int(np.argmin(nodes.sum(axis=1)))
-    second = int(np.argmax(np.linalg.norm(nodes - nodes[first], axis=1)))
-    along = nodes[second] - nodes[first]
-    third = int(np.argmax(np.linalg.norm(np.cross(nodes - nodes[first], along), axis=1)))
-    candidates = np.array([3 * n + a for n in (first, second, third) for a in range(3)])
-    motion = rigid_motion(nodes[[first, second, third]])
-    chosen: list[int] = []
-    for row in range(9):
-        if np.linalg.matrix_rank(motion[[*chosen, row]], tol=1e-9) > len(chosen):
-            chosen.append(row)
-    return candidates[chosen]
 
 
 def _inverse(matrix: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.configuration import Configuration
+from wrist_stiffness.mechanism.vectors import both_halves
 
 LIMB_1 = ("joint_1", "link_1", "joint_2")
 LIMB_2_BASE = ("joint_5", "link_2", "joint_4")
@@ -103,8 +104,8 @@ class Influence:
             MOTOR_SIDE_LAW[part].T @ motor_side + PLATFORM_SIDE_LAW[part].T @ platform_side
             for part in (0, 1)
         )
-        halves = by_link_3.reshape(*by_link_3.shape[:-1], 2, 3) @ self.link_3[..., None, :, :]
-        return direct + halves.reshape(direct.shape)
+        back = np.swapaxes(self.link_3, -1, -2)[..., None, :, :]
+        return direct + both_halves(back, by_link_3)
 
 
 def influence(configuration: Configuration) -> Influence:

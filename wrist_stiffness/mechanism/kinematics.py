@@ -126,14 +126,9 @@ class Mechanism:
     @cached_property
     def alphas(self) -> Array:
         """Link angles alpha_1 ... alpha_5 between (a1,b), (b,c), (c,d), (d,a2), (a1,a2) [rad]."""
-        pairs = (
-            (self.a1, self.b0),
-            (self.b0, self.c0),
-            (self.c0, self.d0),
-            (self.d0, self.a2),
-            (self.a1, self.a2),
-        )
-        return np.array([angle_between(u, v) for u, v in pairs])
+        u = np.array([self.a1, self.b0, self.c0, self.d0, self.a1])
+        v = np.array([self.b0, self.c0, self.d0, self.a2, self.a2])
+        return angle_between(u, v)
 
     @cached_property
     def assembly_mode(self) -> float:

@@ -27,6 +27,9 @@ from wrist_stiffness.mechanism.statics import (
 )
 from wrist_stiffness.mechanism.vectors import beside, block_diagonal, skew
 
+MODES = 6
+"""So many are told at each pose."""
+
 COORDINATES = 6 * len(ELASTIC)
 
 
@@ -90,7 +93,6 @@ def natural_modes(
     components: ElasticComponents,
     bodies: tuple[RigidBody, ...],
     closed: NDArray[np.bool_],
-    count: int = 6,
 ) -> NaturalModes:
     """Solve for the slowest natural modes at poses, motors locked, without damping.
 
@@ -98,7 +100,7 @@ def natural_modes(
     right (docs/physics.md).
 
     `configuration`: of shape (...); `bodies`: what moves with the platform: its plate, and a
-    payload; `closed` (..., m): flange sectors that are and stay in touch; `count`: modes.  Gives
+    payload; `closed` (..., m): flange sectors that are and stay in touch.  Gives
     `NaturalModes`: of shape (...).  Raises `TableError` if the components have no masses.
     """
     if components.mass is None:
@@ -115,10 +117,10 @@ def natural_modes(
     root = vector * np.sqrt(np.maximum(value, 0.0))[..., None, :]
     scaled = mass / np.outer(size, size)
     square, shape = np.linalg.eigh(np.swapaxes(root, -1, -2) @ scaled @ root)
-    slowest = root @ shape[..., : -count - 1 : -1] / size[:, None]
+    slowest = root @ shape[..., : -MODES - 1 : -1] / size[:, None]
     screws = np.swapaxes(slowest, -1, -2)
     return NaturalModes(
-        frequency=1.0 / (2.0 * np.pi * np.sqrt(square[..., : -count - 1 : -1])),
+        frequency=1.0 / (2.0 * np.pi * np.sqrt(square[..., : -MODES - 1 : -1])),
         screws=screws.reshape(*screws.shape[:-1], len(ELASTIC), 6),
     )
 

@@ -18,7 +18,7 @@ from wrist_stiffness.inputs.schema import (
     vector,
 )
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.vectors import block_diagonal, cross, skew
+from wrist_stiffness.mechanism.vectors import cross, screws_to_origin, wrenches_to_origin
 
 IN_MILLIMETRES = 1e-3 * np.outer(*[np.repeat([1.0, 1e3], 3)] * 2)
 """A stiffness in N, N mm, mm and rad over the same in N, N m, m and rad (6, 6)."""
@@ -65,11 +65,9 @@ def own_stiffness(node: Node, distance: float, free: Array) -> OwnStiffness:
     x, y = read.get("x", np.eye(3)[0]), read.get("y", np.eye(3)[1])
     if abs(x @ y) > UNIT_TOLERANCE:
         raise node.refuse(f"x and y are not at a right angle (their product is {x @ y:.3g})")
-    axes = block_diagonal(np.column_stack([x, y, cross(x, y)]))
-    to_origin = np.eye(6)
-    to_origin[3:, :3] = skew(read.get("origin", np.zeros(3)))
+    axes = np.column_stack([x, y, cross(x, y)])
+    wrench = wrenches_to_origin(read.get("origin", np.zeros(3)), axes)
     at_frame = (matrix + matrix.T) / 2.0 / IN_MILLIMETRES
-    wrench = to_origin @ axes
     return OwnStiffness(_inverse(place, wrench @ at_frame @ wrench.T, distance, free))
 
 
@@ -91,8 +89,7 @@ def bearing_pair(centre: Array, axis: Array) -> Schema[OwnStiffness]:
         flexibility = np.zeros((6, 6))
         flexibility[:3, :3] = across / (2.0 * radial) + along / (2.0 * axial)
         flexibility[3:, 3:] = across * 2.0 / (radial * distance**2)
-        to_origin = np.eye(6)
-        to_origin[:3, 3:] = skew(centre)
+        to_origin = screws_to_origin(centre)
         return OwnStiffness(to_origin @ flexibility @ to_origin.T)
 
     return record(keys, make=make)

@@ -7,7 +7,7 @@ import numpy as np
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.material import Material
-from wrist_stiffness.mechanism.vectors import cross, skew
+from wrist_stiffness.mechanism.vectors import cross, screws_to_origin
 
 PINS = {
     ("link_1", "motor_bore"): "joint_1",
@@ -73,5 +73,5 @@ def _pin_flexibility(geometry: Geometry, link: str, joint: str | None, material:
     z = way * outwards
     x = np.linalg.svd(z[None])[2][1]
     axes = np.column_stack([x, cross(z, x), z])
-    screw = np.block([[axes, skew(tip) @ axes], [np.zeros((3, 3)), axes]])
+    screw = screws_to_origin(tip, axes)
     return np.asarray(screw @ flexibility @ screw.T)

@@ -49,6 +49,24 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
     return rotation, shift
 
 
+def pose_of_twist(twist: Array) -> tuple[Array, Array]:
+    """Return the rigid motion of a twist as messages carry it.
+
+    `twist` (..., 6): (translation; rotation) at O in F [m, rad].  Gives `position` (..., 3): where
+    the point at O goes [m], and `quaternion` (..., 4): rotation, x y z w with w >= 0 for angles up
+    to pi.
+    """
+    if native is not None:
+        pose = np.empty((*twist.shape[:-1], 7))
+        native.pose_of_twist(np.ascontiguousarray(twist, float), pose)
+        return pose[..., :3], pose[..., 3:]
+    half = 0.5 * np.sqrt(dot(twist[..., 3:], twist[..., 3:]))[..., None]
+    # sin(x) / x, with numpy's pi in it.
+    scale = 0.5 * np.sinc(half / np.pi)
+    quaternion = np.concatenate([scale * twist[..., 3:], np.cos(half)], axis=-1)
+    return exp_twist(twist)[1], quaternion
+
+
 def rotation_vector(rotation: Array) -> Array:
     """Return the rotation vectors (..., 3) [rad] of rotation matrices (..., 3, 3).
 

@@ -22,7 +22,7 @@ from wrist_stiffness.mechanism.components import (
 )
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.influence import Influence, influence
-from wrist_stiffness.mechanism.vectors import below, beside, block_diagonal
+from wrist_stiffness.mechanism.vectors import below, beside, block_diagonal, both_halves
 
 N_ELASTIC = len(ELASTIC)
 
@@ -71,10 +71,10 @@ def weight_wrench(
     r = component_rotations(configuration)
     field = _to_body(r, gravity)
     motor_side, platform_side = (
-        _turned(r, (weights @ field)[..., 0])
+        both_halves(r, (weights @ field)[..., 0])
         for weights in (components.weight_motor_side, components.weight_platform_side)
     )
-    carried = _turned(
+    carried = both_halves(
         np.swapaxes(projectors.of_components(), -1, -2),
         platform_weight(configuration, components, gravity)[..., None, :],
     )
@@ -86,12 +86,12 @@ def platform_weight(
 ) -> Array:
     """Weight of the platform as a wrench at O in F, (..., 6)."""
     r = configuration.platform
-    return _turned(r, (components.platform_weight @ _to_body(r, gravity))[..., 0])
+    return both_halves(r, (components.platform_weight @ _to_body(r, gravity))[..., 0])
 
 
 def platform_twist(projectors: Influence, screws: Array) -> Array:
     """Sum G_k delta_k over the elastic components, (..., 6) for `screws` (..., 8, 6) [m, rad]."""
-    return _turned(projectors.of_components(), screws).sum(axis=-2)
+    return both_halves(projectors.of_components(), screws).sum(axis=-2)
 
 
 def slides(projectors: Influence, screws: Array) -> Array:
@@ -102,12 +102,6 @@ def slides(projectors: Influence, screws: Array) -> Array:
 def _to_body(rotation: Array, vector: Array) -> Array:
     """Return a vector (3,) of F in turned bodies, as columns (..., 3, 1)."""
     return np.swapaxes(rotation, -1, -2) @ vector[:, None]
-
-
-def _turned(matrix: Array, six: Array) -> Array:
-    """Apply (..., 3, 3) matrices to both halves of 6-vectors (..., 6)."""
-    halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(matrix, -1, -2)
-    return halves.reshape(*halves.shape[:-2], 6)
 
 
 @dataclass(frozen=True)
@@ -252,12 +246,12 @@ def _summed(
     screw, screw_slide, screw_twist = (np.empty((*r.shape[:-3], len(own), k)) for k in (6, 3, 6))
     for component in np.unique(own):
         alike = own == component
-        turned = _turned(r[..., component, None, :, :], sectors.screw[mine][alike])
+        turned = both_halves(r[..., component, None, :, :], sectors.screw[mine][alike])
         screw[..., alike, :] = turned
         screw_slide[..., alike, :] = turned[..., :3] @ np.swapaxes(
             rows[..., component, :, :], -1, -2
         )
-        screw_twist[..., alike, :] = _turned(g[..., component, None, :, :], turned)
+        screw_twist[..., alike, :] = both_halves(g[..., component, None, :, :], turned)
     # Half of a symmetric sum.
     half = 0.5 * slide_flexibility @ sectors.slide.T
     half[..., mine] += np.swapaxes(screw_slide, -1, -2)

@@ -6,6 +6,8 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 
+IDENTITY = np.eye(3)
+
 NEXT, BEFORE = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
@@ -69,6 +71,29 @@ def block_diagonal(rotation: Array) -> Array:
     out[..., :3, :3] = rotation
     out[..., 3:, 3:] = rotation
     return out
+
+
+def screws_to_origin(point: Array, axes: Array = IDENTITY) -> Array:
+    """Return what takes screws at a point (3,) in turned axes (3, 3) to screws at O, (6, 6).
+
+    Its transpose takes wrenches at O to the point.
+    """
+    out = block_diagonal(axes)
+    out[:3, 3:] = skew(point) @ axes
+    return out
+
+
+def wrenches_to_origin(point: Array, axes: Array = IDENTITY) -> Array:
+    """Return what takes wrenches at a point (3,) in turned axes (3, 3) to wrenches at O, (6, 6)."""
+    out = block_diagonal(axes)
+    out[3:, :3] = skew(point) @ axes
+    return out
+
+
+def both_halves(matrix: Array, six: Array) -> Array:
+    """Apply (..., 3, 3) matrices to both halves of 6-vectors (..., 6)."""
+    halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(matrix, -1, -2)
+    return halves.reshape(*halves.shape[:-2], 6)
 
 
 def beside(matrices: Array) -> Array:

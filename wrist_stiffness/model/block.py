@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
+from wrist_stiffness.mechanism.vectors import both_halves
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class Load(NamedTuple):
         """Return the wrench in F at a configuration, (6,) [N, N m]."""
         if not self.on_platform:
             return self.wrench
-        return (self.wrench.reshape(2, 3) @ configuration.platform.T).ravel()
+        return both_halves(configuration.platform, self.wrench)
 
 
 @dataclass(frozen=True)

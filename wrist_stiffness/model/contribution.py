@@ -14,6 +14,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.compiled import GROUPS
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
+from wrist_stiffness.mechanism.vectors import both_halves
 from wrist_stiffness.model.places import BODY, LIMB, MOTOR_JOINT
 
 
@@ -120,14 +121,16 @@ class Constants:
     def sensor(self, configuration: Configuration) -> tuple[Array | None, Array | None]:
         """Return X (6,) and, turned with the platform, Y (n, 6) or (6,) of the pose sensor."""
         right = self.sensor_right
-        return self.sensor_left, None if right is None else _turned(configuration.platform, right)
+        return self.sensor_left, None if right is None else both_halves(
+            configuration.platform, right
+        )
 
     def at(self, configuration: Configuration) -> Contribution:
         """Return what is added at n configurations, what the sensor says of it apart."""
         n = len(configuration.theta)
         limbs: dict[str, Array] = {}
         if self.screws is not None:
-            turned = _turned(configuration.bodies.take(_BODIES, axis=-3), self.screws)
+            turned = both_halves(configuration.bodies.take(_BODIES, axis=-3), self.screws)
             limbs = {limb: turned[..., rows, :].sum(axis=-2) for limb, rows in _LIMBS.items()}
         return Contribution(
             **limbs,
@@ -138,9 +141,3 @@ class Constants:
 
 def _each(value: Array | None, n: int) -> Array | None:
     return None if value is None else np.broadcast_to(value, (n, len(value)))
-
-
-def _turned(rotation: Array, six: Array) -> Array:
-    """Turn 6-vectors (6,) or (k, 6) by rotations (..., 3, 3) or (..., k, 3, 3), (..., 6)."""
-    halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(rotation, -1, -2)
-    return halves.reshape(*rotation.shape[:-2], 6)

@@ -18,6 +18,7 @@ from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.contact import solve_contacts
+from wrist_stiffness.mechanism.vectors import both_halves
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.contribution import NOTHING, Contribution
@@ -139,8 +140,7 @@ def situation_of(
     configuration = model.table.mechanism.forward(block.theta) if pose is None else pose.as_block
     load = block.load
     if block.load_on_platform:
-        halves = load.reshape(-1, 2, 3) @ np.swapaxes(configuration.platform, -1, -2)
-        load = halves.reshape(-1, 6)
+        load = both_halves(configuration.platform, load)
     statics = BlockStatics(block, load, configuration, model.evaluation, model.table, model.parts)
     wrist = None if pose is None else _wrist(model, pose)
     return Situation(statics, model.constants, guess=guess, wrist=wrist)

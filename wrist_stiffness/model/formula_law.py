@@ -44,29 +44,15 @@ class FormulaLaw(Law):
 
     At the load sensor it is a wrench in F on the platform, beyond what the sensor says [N, N m].
 
-    Parameters
-    ----------
-    name : str
-        Id of the effect.
-    place : str
-        Its component.
-    direction : (6,) float
-        (translation; rotation) at O in the component's home frame for a value of 1 [m, rad].
-    expression : str
-        In `theta_1`, `theta_2` [rad], `theta_dot_1`, `theta_dot_2` [rad/s], `turn_2` ... `turn_4`
-        (turns of the passive joints from home [rad]), `fx` ... `mz` (wrench
-        through the component at O in its home frame [N, N m]), `W_fx` ... `W_mz` (wrench on the
-        platform at O in F), `T_<component>` [degC], `time` [s], the covariates and the parameters.
-    covariates : sequence of str
-        Covariates that it may use.
-    keys : sequence of str
-        Parameters; one whose name ends in a known unit is converted to SI units.
-
-    Raises
-    ------
-    InputError
-        If the id cannot be one, the component carries no screw, the direction is not six finite
-        numbers or zero, a name is no name or used twice, or the expression is not allowed.
+    `name`: id of the effect.  `place`: its component.  `direction` (6,): (translation; rotation) at
+    O in the component's home frame for a value of 1 [m, rad].  `expression`: in `theta_1`,
+    `theta_2` [rad], `theta_dot_1`, `theta_dot_2` [rad/s], `turn_2` ... `turn_4` (turns of the
+    passive joints from home [rad]), `fx` ... `mz` (wrench through the component at O in its home
+    frame [N, N m]), `W_fx` ... `W_mz` (wrench on the platform at O in F), `T_<component>` [degC],
+    `time` [s], the covariates and the parameters.  `covariates`: those that it may use.  `keys`:
+    parameters; one whose name ends in a known unit is converted to SI units.  Raises `InputError`
+    if the id cannot be one, the component carries no screw, the direction is not six finite numbers
+    or zero, a name is no name or used twice, or the expression is not allowed.
     """
 
     check = "what the formula's author has in mind"

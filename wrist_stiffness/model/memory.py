@@ -30,6 +30,22 @@ def play(values: Array, half_width: Array | float, start: Array) -> Array:
     return np.clip(start, low, high)
 
 
+Before = tuple[float, Array]
+"""Time [s] and values (k,) of the sample before a block."""
+
+
+def slope(time: Array, values: Array, before: Before | None) -> tuple[Array, Before]:
+    """Return how fast values (n, k) change from sample to sample, and what the next block gets.
+
+    Zero where time (n,) [s] stands still, and at the very first sample.
+    """
+    last_s, last = before or (time[0], values[0])
+    interval = (time - np.concatenate([[last_s], time[:-1]]))[:, None]
+    step = values - np.concatenate([last[None], values[:-1]])
+    found = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
+    return found, (time[-1], values[-1])
+
+
 def lag(values: Array, interval: Array, time_constant: float, before: Array, start: Array) -> Array:
     """Follow a value with a first-order lag, exact for the mean of neighbouring samples held.
 

@@ -15,8 +15,13 @@ from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.contact import forces_of, solve_contacts
 from wrist_stiffness.mechanism.energy import component_wrenches, flange_screws
 from wrist_stiffness.mechanism.influence import IN_LIMB_1, Influence
-from wrist_stiffness.mechanism.statics import ContactOperators, component_rotations, slides
-from wrist_stiffness.mechanism.vectors import dot
+from wrist_stiffness.mechanism.statics import (
+    ContactOperators,
+    component_rotations,
+    platform_twist,
+    slides,
+)
+from wrist_stiffness.mechanism.vectors import both_halves, dot
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.contribution import (
@@ -118,13 +123,12 @@ class Situation:
 
     def at_home(self, place: str, six: Array) -> Array:
         """Return 6-vectors (n, 6) at O in F in the place's body, turned back home."""
-        halves = six.reshape(-1, 2, 3) @ self.body(place)
-        return halves.reshape(-1, 6)
+        return both_halves(np.swapaxes(self.body(place), -1, -2), six)
 
     def in_base(self, place: str, six: Array) -> Array:
         """Return 6-vectors (n, 6) or (6,) at O in the place's home frame at O in F."""
-        halves = np.reshape(six, (-1, 2, 3)) @ np.swapaxes(self.body(place), -1, -2)
-        return halves.reshape(-1, 6)
+        # A user's own law may give a list.
+        return both_halves(self.body(place), np.asarray(six))
 
     def screw(self, place: str, home: Array) -> Contribution:
         """Return a screw (n, 6) or (6,) at O in the place's home frame as a contribution."""
@@ -244,7 +248,7 @@ class Situation:
         twist, gap = np.zeros((n, 6)), np.zeros((n, len(sectors.gap)))
         for six, g in ((added.limb_1, projectors.limb_1), (added.limb_2, projectors.limb_2)):
             if six is not None:
-                twist += _halves(g, six)
+                twist += both_halves(g, six)
         if added.both is not None:
             twist += added.both
         relative = _difference(added.limb_1, added.limb_2)
@@ -257,7 +261,7 @@ class Situation:
             gap += (np.swapaxes(self.operators.force_twist, -1, -2) @ column)[..., 0]
         if added.through is not None:
             bent = (self.statics.turned_flexibility @ added.through[..., None])[..., 0]
-            twist += _halves(projectors.of_components(), bent).sum(axis=-2)
+            twist += platform_twist(projectors, bent)
             gap += slides(projectors, bent) @ sectors.slide.T
             gap += self._opened(added.through)
         if added.gap is not None:
@@ -266,9 +270,10 @@ class Situation:
 
     def _opened(self, through: Array) -> Array:
         """Return by how much the bushings' own screws under wrenches (n, 8, 6) open flanges."""
-        sectors, n = self.parts.sectors, len(through)
-        home = through.reshape(n, -1, 2, 3) @ component_rotations(self.configuration)
-        return dot(home.reshape(n, -1, 6).take(sectors.component, axis=1), sectors.screw)
+        sectors = self.parts.sectors
+        back = np.swapaxes(component_rotations(self.configuration), -1, -2)
+        home = both_halves(back, through)
+        return dot(home.take(sectors.component, axis=1), sectors.screw)
 
     def with_contact(self, twist: Array, gap: Array, closed: NDArray[np.bool_]) -> Array:
         """Return what a carried contribution does where the closed sectors hold: the tangent.
@@ -308,12 +313,6 @@ class Situation:
         if name not in self.block.covariates:
             raise MissingSignalError(f"covariate {name}")
         return self.block.covariates[name]
-
-
-def _halves(matrix: Array, six: Array) -> Array:
-    """Apply (..., 3, 3) matrices to both halves of 6-vectors (..., 6)."""
-    halves = six.reshape(*six.shape[:-1], 2, 3) @ np.swapaxes(matrix, -1, -2)
-    return halves.reshape(six.shape)
 
 
 def _difference(first: Array | None, second: Array | None) -> Array | None:

@@ -32,6 +32,7 @@ from wrist_stiffness.model.contribution import (
 )
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import STAGES
+from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.situation import Situation, lengths
 
 if TYPE_CHECKING:
@@ -242,15 +243,8 @@ def with_speeds(block: Block, memory: Memory | None) -> Block:
     """Return the block with motor speeds, by backward differences where it has none."""
     if block.theta_dot is not None:
         return block
-    if memory is None:
-        interval, step = block.time - block.time[0], block.theta - block.theta[0]
-    else:
-        interval, step = block.time - memory.time, block.theta - memory.theta
-    if len(block) > 1:
-        interval[1:], step[1:] = np.diff(block.time), np.diff(block.theta, axis=0)
-    interval = interval[:, None]
-    speed = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
-    return replace(block, theta_dot=speed)
+    before = None if memory is None else (memory.time, memory.theta)
+    return replace(block, theta_dot=slope(block.time, block.theta, before)[0])
 
 
 def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contribution, Any]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PoseWithCovarianceStamped
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
@@ -26,7 +26,6 @@ from wrist_stiffness.ros.changes import Change, all_or_none
 from wrist_stiffness.ros.conversions import three
 from wrist_stiffness.ros.guarded_node import ACTIVE, ALL_STATES, CONFIGURED
 from wrist_stiffness.ros.qos import COMMAND_QOS
-from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.sliced_work import SlicedWork
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
@@ -58,6 +57,7 @@ class AngleCorrector(WristNode):
     """
 
     stream: CorrectionStream
+    settings_of = staticmethod(correction_settings)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("angle_corrector", CORRECTION, **options)
@@ -78,10 +78,6 @@ class AngleCorrector(WristNode):
         stream = CorrectionStream(None, settings, self.get_parameter("enabled_on_start").value)
         stream.active = False
         return stream
-
-    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
-        """Check parameters and return the settings that they stand for."""
-        return correction_settings(values)
 
     def make_inputs(self) -> None:
         """Listen to commands, in every state but the last: see `inactive_commands`."""
@@ -232,12 +228,3 @@ class AngleCorrector(WristNode):
         if self.stream.enabled and supervision.text:
             return f"{supervision.state.value}: {supervision.text}"
         return ""
-
-
-def main() -> NoReturn:
-    """Run the node."""
-    run(AngleCorrector)
-
-
-if __name__ == "__main__":
-    main()

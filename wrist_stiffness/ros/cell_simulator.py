@@ -34,7 +34,7 @@ from wrist_stiffness.ros.conversions import (
 )
 from wrist_stiffness.ros.parameters import declare, model_path
 from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
-from wrist_stiffness.ros.run import run, tell
+from wrist_stiffness.ros.run import tell
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.experiment import EXPERIMENTS
 from wrist_stiffness.topics import (
@@ -312,12 +312,3 @@ class CellSimulator(Node):
         )
         self._command.publish(joint_message(stamp_ns, "", self._names, self.cell.desired(time_s)))
         self._asked_s = time.monotonic()
-
-
-def main() -> NoReturn:
-    """Run the node."""
-    run(CellSimulator)
-
-
-if __name__ == "__main__":
-    main()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseArray, PoseStamped, PoseWithCovarianceStamped
@@ -17,7 +17,6 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.ros.conversions import nanoseconds, pose_numbers, three
 from wrist_stiffness.ros.parameters import values_of
 from wrist_stiffness.ros.qos import SENSOR_QOS, STATE_QOS
-from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import JointSample, error_payload, joint_reader
 from wrist_stiffness.ros.wrist_node import WristNode
 from wrist_stiffness.topics import (
@@ -116,12 +115,3 @@ class ModelMonitor(WristNode):
         self._residual.publish(error_payload(stamp_ns, residual, covariance, self.base_frame))
         self._alarm.publish(Bool(data=self.stream.monitor.alarm))
         self.health.good()
-
-
-def main() -> NoReturn:
-    """Run the node."""
-    run(ModelMonitor)
-
-
-if __name__ == "__main__":
-    main()

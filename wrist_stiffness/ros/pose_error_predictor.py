@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped, Vector3Stamped
@@ -24,7 +24,6 @@ from wrist_stiffness.mechanism.urdf import urdf
 from wrist_stiffness.model.error_model import Prediction
 from wrist_stiffness.ros.conversions import body_transforms, transforms_type
 from wrist_stiffness.ros.qos import SENSOR_QOS, STATE_QOS
-from wrist_stiffness.ros.run import run
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
     error_payload,
@@ -94,6 +93,7 @@ class PoseErrorPredictor(WristNode):
     """Publishes `/pose_error_predicted`; nothing for a sample that cannot be predicted."""
 
     stream: PredictionStream
+    settings_of = staticmethod(prediction_settings)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)
@@ -115,10 +115,6 @@ class PoseErrorPredictor(WristNode):
     def make_stream(self, settings: StreamSettings) -> PredictionStream:
         """Return the prediction stream."""
         return PredictionStream(None, settings)
-
-    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
-        """Check parameters and return the settings that they stand for."""
-        return prediction_settings(values)
 
     def make_inputs(self) -> None:
         """Listen to the motors."""
@@ -156,7 +152,7 @@ class PoseErrorPredictor(WristNode):
         stamp_ns = joints.stamp_ns
         prediction = self.stream.on_joint_state(
             stamp_ns, joints.names, joints.positions, joints.velocities
-        ).prediction
+        )
         frame, twist = self.base_frame, prediction.twist
         self._error.publish(error_payload(stamp_ns, twist, prediction.covariance, frame))
         if self._s_um.get_subscription_count():
@@ -183,12 +179,3 @@ class PoseErrorPredictor(WristNode):
         drawing = drawing_of(geometry, exaggeration, self.base_frame)
         at, twist = prediction.configuration.as_block, prediction.twist[None]
         self._markers.publish(*drawing.payloads(np.array([stamp_ns]), at, twist))
-
-
-def main() -> NoReturn:
-    """Run the node."""
-    run(PoseErrorPredictor)
-
-
-if __name__ == "__main__":
-    main()

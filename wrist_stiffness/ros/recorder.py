@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from functools import partial
 from importlib import import_module
-from typing import Any, NoReturn
+from typing import Any
 
 from rclpy.node import Node
 
@@ -32,7 +32,6 @@ from wrist_stiffness.recording.messages import (
 from wrist_stiffness.ros.executor import DataGroup, take_in_order
 from wrist_stiffness.ros.parameters import declare
 from wrist_stiffness.ros.qos import NOTES_QOS, RECORDING_QOS
-from wrist_stiffness.ros.run import run
 
 PARAMETERS = (
     ParameterEntry("output", "", "new folder, or new file ending in .mcap", fixed=True),
@@ -128,12 +127,3 @@ class Recorder(Node):
                 self._recording.close()
             finally:
                 super().destroy_node()
-
-
-def main() -> NoReturn:
-    """Run the node."""
-    run(Recorder)
-
-
-if __name__ == "__main__":
-    main()

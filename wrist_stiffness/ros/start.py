@@ -9,16 +9,27 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from functools import partial
 from importlib import import_module
 from types import FrameType
 from typing import NoReturn
 
+NODES = {
+    "pose_error_predictor": "PoseErrorPredictor",
+    "angle_corrector": "AngleCorrector",
+    "model_monitor": "ModelMonitor",
+    "cell_simulator": "CellSimulator",
+    "recorder": "Recorder",
+}
+"""Class of each node by its module."""
+
 
 def start(name: str) -> None:
-    """Load a module of `wrist_stiffness.ros` by its name, and run its node."""
+    """Load the module of a node by its name, and run the node."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _end)
-    import_module(f"wrist_stiffness.ros.{name}").main()
+    node = getattr(import_module(f"wrist_stiffness.ros.{name}"), NODES[name])
+    import_module("wrist_stiffness.ros.run").run(node)
 
 
 def _end(number: int, frame: FrameType | None) -> NoReturn:
@@ -26,24 +37,11 @@ def _end(number: int, frame: FrameType | None) -> NoReturn:
     os._exit(0)
 
 
-def pose_error_predictor() -> None:
-    """Start this node."""
-    start("pose_error_predictor")
-
-
-def angle_corrector() -> None:
-    """Start this node."""
-    start("angle_corrector")
-
-
-def model_monitor() -> None:
-    """Start this node."""
-    start("model_monitor")
-
-
-def cell_simulator() -> None:
-    """Start this node."""
-    start("cell_simulator")
+# The installed executables.
+pose_error_predictor = partial(start, "pose_error_predictor")
+angle_corrector = partial(start, "angle_corrector")
+model_monitor = partial(start, "model_monitor")
+cell_simulator = partial(start, "cell_simulator")
 
 
 if __name__ == "__main__":

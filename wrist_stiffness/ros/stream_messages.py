@@ -14,9 +14,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.compensation.pose import pose_of_twist
 from wrist_stiffness.compensation.trajectory_plan import PlannedPoint, planned_point
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.recording.cdr import decode_in_steps, encode_in_steps
 from wrist_stiffness.recording.fixed_layout import FixedLayout, FixedReader
 from wrist_stiffness.recording.messages import (

@@ -62,12 +62,14 @@ class WristNode(GuardedNode, ABC):
     """
 
     stream: Stream
+    settings_of: Callable[[Mapping[str, Any]], StreamSettings] = staticmethod(stream_settings)
+    """Checks parameters and returns the settings that they stand for (may raise InputError)."""
 
     def __init__(self, name: str, entries: Sequence[ParameterEntry], **options: Any) -> None:
         super().__init__(name, **options)
         self._entries = (*COMMON, *entries)
         declare(self, self._entries)
-        self.stream = self.make_stream(self.apply_values(values_of(self, self._entries)))
+        self.stream = self.make_stream(self.settings_of(values_of(self, self._entries)))
         self.base_frame = self.stream.settings.frames.prefix + BASE_FRAME  # name of F on topics
         # effects that the model left out of its last prediction, and why
         self.left_out: tuple[str, ...] = ()
@@ -95,10 +97,6 @@ class WristNode(GuardedNode, ABC):
     @abstractmethod
     def make_inputs(self) -> None:
         """Hear what the node needs beside loads and slow signals, in the order of taking."""
-
-    def apply_values(self, values: Mapping[str, Any]) -> StreamSettings:
-        """Check parameters and return the settings that they stand for (may raise InputError)."""
-        return stream_settings(values)
 
     def facts(self) -> dict[str, str]:
         """Return what the node adds to its status."""
@@ -254,14 +252,14 @@ class WristNode(GuardedNode, ABC):
     def _check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         values = {**values_of(self, self._entries), **{p.name: p.value for p in changes}}
         try:
-            self.apply_values(values)
+            self.settings_of(values)
         except Exception as error:
             reason = str(error) if isinstance(error, WristError) else repr(error)
             return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
     def _use_parameters(self, changes: list[Parameter]) -> None:
-        self.stream.settings = self.apply_values(values_of(self, self._entries))
+        self.stream.settings = self.settings_of(values_of(self, self._entries))
 
     def _loading(self) -> Loading:
         path = model_path(self.get_parameter("model_file").value)

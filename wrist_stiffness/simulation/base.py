@@ -8,12 +8,10 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.simulation.laws.axis_misalignment import AxisMisalignment
 from wrist_stiffness.simulation.laws.joint_play import FlangeGap
-from wrist_stiffness.simulation.laws.law import Law
-from wrist_stiffness.simulation.laws.load_sensor import LoadMatrix
+from wrist_stiffness.simulation.laws.law import BodyScrew, Law, LoadReading
 from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness
-from wrist_stiffness.simulation.laws.pose_sensor import MeasurementFrame, TargetMounting
+from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion, TargetMounting
 from wrist_stiffness.simulation.seat import Seat
 
 BASES = ("exact", "wrong")
@@ -46,23 +44,23 @@ def base_laws(name: str, table: Table, seed: int, session: int) -> list[Law]:
         *softer,
         *axes,
         *_shims(table, axes),
-        LoadMatrix(scale * np.eye(6)),
+        LoadReading(lambda block, wrench: scale * wrench),
         TargetMounting(turn * day.uniform(-1.0, 1.0, 6)),
-        MeasurementFrame(turn * day.uniform(-1.0, 1.0, 6)),
+        SensorMotion(turn * day.uniform(-1.0, 1.0, 6)),
     ]
 
 
-def _misaligned(joint: str, table: Table, rng: np.random.Generator) -> AxisMisalignment:
+def _misaligned(joint: str, table: Table, rng: np.random.Generator) -> BodyScrew:
     seat = Seat.of(table.geometry, joint)
     size = np.repeat([AXIS_SHIFT, AXIS_TILT], 3)
     local = size * rng.uniform(-1.0, 1.0, 6)
-    return AxisMisalignment(joint, seat.to_origin(np.eye(3)) @ local)
+    return BodyScrew(joint, seat.to_origin(np.eye(3)) @ local)
 
 
-def _shims(table: Table, axes: list[AxisMisalignment]) -> list[Law]:
+def _shims(table: Table, axes: list[BodyScrew]) -> list[Law]:
     """Return what the fitter does: at home the flanges stand as designed again."""
     rows = influence(table.mechanism.forward(np.zeros(2))).slides()
-    slides = sum(rows[ELASTIC.index(law.joint)] @ law.screw[:3] for law in axes)
+    slides = sum(rows[ELASTIC.index(law.component)] @ law.screw[:3] for law in axes)
     return [
         FlangeGap(joint, float(-table.components.contact[joint].sign[0] * slide))
         for joint, slide in zip(PASSIVE_JOINTS, np.asarray(slides), strict=True)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import angles_text, first_where
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.base import base_laws
+from wrist_stiffness.simulation.block import Rate, taken
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.drive import Drive
 from wrist_stiffness.simulation.exact import ExactWrist
@@ -86,17 +86,6 @@ class CellSample:
     measured_shift: Array  # (..., 3), position as measured [m]; NaN where it is not
     temperature: Array  # (..., 8), of `SENSED` [degC]
 
-    def __getitem__(self, place: int) -> CellSample:
-        """Return one sample of a block."""
-        return CellSample(*(getattr(self, field.name)[place] for field in fields(self)))
-
-    @staticmethod
-    def joined(blocks: Sequence[CellSample]) -> CellSample:
-        """Return blocks in a row as one."""
-        return CellSample(
-            *(np.concatenate([getattr(b, f.name) for b in blocks]) for f in fields(CellSample))
-        )
-
 
 def true_laws(table: Table, settings: CellSettings) -> list[Law]:
     """Return all laws by which the true wrist departs from its table.
@@ -146,7 +135,7 @@ class VirtualCell:
         self._static = pose_sensor.static
         self._view = PoseView(settings.sees, settings.lost_beams, view_rng)
         self._drive = Drive(table.geometry.limits.encoder_step, drive_rng)
-        self._departed: tuple[float, Array] | None = None
+        self._departs = Rate()
         self._load_noise = NoiseSource(sensor.force, sensor.moment, load_rng)
         self._pose_noise = NoiseSource(pose_sensor.shift, pose_sensor.rotation, pose_rng)
 
@@ -162,7 +151,7 @@ class VirtualCell:
         axis.  Raises `UnreachablePoseError` if an angle is beyond the end stops, or the loop does
         not close.
         """
-        return self.run(np.array([time_s]), np.asarray(sent, dtype=float)[None])[0]
+        return taken(self.run(np.array([time_s]), np.asarray(sent, dtype=float)[None]), 0)
 
     def run(self, time_s: Array, sent: Array) -> CellSample:
         """Advance through a block of samples; as `step` one by one, and faster.
@@ -224,12 +213,7 @@ class VirtualCell:
         What an encoder counts wrong is so small a part of a speed that it is left out.
         """
         departure = sent - self.desired(time_s)
-        last_s, last = self._departed or (time_s[0], departure[0])
-        step = np.diff(departure, axis=0, prepend=last[None])
-        interval = np.diff(time_s, prepend=last_s)[:, None]
-        rate = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
-        self._departed = float(time_s[-1]), departure[-1]
-        speed = self.program.speed(time_s) + rate
+        speed = self.program.speed(time_s) + self._departs(time_s, departure)
         for law in self._laws:
             speed = law.read_speed(time_s, speed)
         return self._drive.tell(speed)

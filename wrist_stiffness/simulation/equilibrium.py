@@ -12,7 +12,7 @@ with the tangent flexibilities of the laws.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.contact import solve_contact
+from wrist_stiffness.mechanism.contact import solve_contacts
 from wrist_stiffness.mechanism.influence import Influence, influence
 from wrist_stiffness.mechanism.statics import (
     ContactOperators,
@@ -35,7 +35,6 @@ Bend = Callable[[Array], tuple[Array, Array]]
 """Law of one component: wrench (n, 6) to screw (n, 6) and its symmetric tangent (n, 6, 6)."""
 
 MAX_STEPS = 60
-MAX_EXCHANGES = 25
 FORCE_TOLERANCE = 1e-9
 """A change of the flange forces this small against the largest one ends the iteration."""
 
@@ -46,8 +45,6 @@ BISECTIONS = 12
 
 FLAT = 0.3
 """A search along a line ends where its slope has fallen to this share of the one at its start."""
-
-ROUNDING = 1e-11
 
 
 @dataclass(frozen=True)
@@ -60,14 +57,6 @@ class Equilibrium:
     slips: Array
     force: Array  # (n, m), of each flange sector [N]
     closed: NDArray[np.bool_]  # (n, m), sectors in contact
-
-    @staticmethod
-    def joined(parts: Sequence[Equilibrium]) -> Equilibrium:
-        """Return samples in a row as one."""
-        if len(parts) == 1:
-            return parts[0]
-        names = [field.name for field in fields(Equilibrium)]
-        return Equilibrium(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
 class Pose:
@@ -259,39 +248,3 @@ def _step_length(opening: Callable[[Array], Array], force: Array, change: Array)
         middle = np.where(search, 0.5 * (low + high), middle)
         here = slope(middle)
     return middle
-
-
-def solve_contacts(
-    approach: Array, gap: Array, closed: NDArray[np.bool_]
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Solve the contact problems of n samples at once by block principal pivoting.
-
-    `approach` (n, m, m): symmetric positive definite [m/N]; `gap` (n, m): opening without forces
-    [m]; `closed` (n, m): first guess.  Gives `force` (n, m): not negative [N], and `closed` (n, m):
-    sectors in contact.
-    """
-    closed = closed | (gap < 0.0) if not closed.any() else closed.copy()
-    force = np.zeros_like(gap)
-    scale = np.max(np.abs(gap), axis=1)
-    stiff = scale / np.max(np.diagonal(approach, axis1=1, axis2=2), axis=1)
-    todo = np.arange(len(gap))
-    identity = np.eye(gap.shape[1])
-    for _ in range(MAX_EXCHANGES):
-        on = closed[todo]
-        matrix = np.where(on[:, :, None] & on[:, None, :], approach[todo], identity)
-        right = np.where(on, -gap[todo], 0.0)
-        force[todo] = np.linalg.solve(matrix, right[..., None])[..., 0]
-        opening = gap[todo] + (approach[todo] @ force[todo][..., None])[..., 0]
-        wrong = np.where(
-            on,
-            force[todo] < -ROUNDING * stiff[todo, None],
-            opening < -ROUNDING * scale[todo, None],
-        )
-        closed[todo] ^= wrong
-        todo = todo[wrong.any(axis=1)]
-        if len(todo) == 0:
-            break
-    for i in todo:
-        # Pivoting in blocks can cycle; one change at a time always ends.
-        force[i], closed[i] = solve_contact(approach[i], gap[i])
-    return np.maximum(force, 0.0), closed

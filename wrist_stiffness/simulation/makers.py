@@ -5,7 +5,11 @@ The comment says why a wrist with more than the largest magnitude would not work
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.components import (
     ELASTIC,
@@ -15,40 +19,41 @@ from wrist_stiffness.mechanism.components import (
     PASSIVE_JOINTS,
     Array,
 )
-from wrist_stiffness.mechanism.vectors import block_diagonal, skew, unit
-from wrist_stiffness.simulation.effect_entry import LEVER, Draw, effect
-from wrist_stiffness.simulation.laws.added_spring import (
-    MountSpring,
-    OneSidedDrive,
-    OuterSpring,
-    StiffeningDrive,
-    drive_flexibility,
+from wrist_stiffness.mechanism.vectors import (
+    block_diagonal,
+    both_halves,
+    cross,
+    screws_to_origin,
+    skew,
+    unit,
 )
-from wrist_stiffness.simulation.laws.axis_misalignment import AxisMisalignment
+from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.effect_entry import LEVER, Draw, effect
+from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.bushing_polymer import (
     BushingHardening,
     Creep,
     ThermalSoftening,
 )
 from wrist_stiffness.simulation.laws.cable_wrench import CableWrench
+from wrist_stiffness.simulation.laws.drive import Drive, one_sided, stiffening
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
 from wrist_stiffness.simulation.laws.joint_play import FlangeGap, JointClearance
-from wrist_stiffness.simulation.laws.law import DRIVEN, JOINED, Law
-from wrist_stiffness.simulation.laws.load_sensor import (
-    LoadBias,
-    LoadMatrix,
-    LoadPoint,
-    turned_sensor,
+from wrist_stiffness.simulation.laws.law import (
+    DRIVEN,
+    JOINED,
+    BodyScrew,
+    Law,
+    LoadReading,
+    PlatformMotion,
 )
 from wrist_stiffness.simulation.laws.motor_turn import (
+    AheadOfEncoder,
     Backlash,
-    EccentricEncoder,
-    EncoderOffset,
-    TransmissionError,
 )
-from wrist_stiffness.simulation.laws.part_stiffness import EndHinge, UniformSoftness
+from wrist_stiffness.simulation.laws.part_stiffness import InSeries, UniformSoftness
 from wrist_stiffness.simulation.laws.point_mass import AddedMass, Inertia, MountingTilt
-from wrist_stiffness.simulation.laws.pose_sensor import Drift, MeasurementFrame, TargetMounting
+from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion, TargetMounting
 from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
 from wrist_stiffness.simulation.laws.time_delay import TimeDelay
 from wrist_stiffness.simulation.seat import Seat
@@ -59,19 +64,25 @@ def spring(d: Draw, place: Array) -> Array:
     frame = np.linalg.qr(d.rng.normal(size=(3, 3)))[0]
     sizes = np.concatenate([d.rng.uniform(0.3, 1.0, 3), d.rng.uniform(0.3, 1.0, 3) / LEVER**2])
     turn = block_diagonal(frame)
-    move = np.eye(6)
-    move[:3, 3:] = skew(place)
+    move = screws_to_origin(place)
     return move @ turn @ np.diag(sizes) @ turn.T @ move.T
 
 
 # Aluminium where steel was drawn bends three times as much.
 @effect(LINKS, "-", 0.2, 2.0, 50.0, ("uniform", "hinge"))
 def link_stiffness(d: Draw) -> Law:
-    """Return softer steel, or one bore that gives way."""
+    """Return softer steel, or a cracked bore: it bends about all axes there.
+
+    By a share of the bar's own mean flexibility in rotation.
+    """
     if d.form == "uniform":
         return UniformSoftness(d.component, d.magnitude)
     end = d.table.geometry.link_ends(d.component)[d.rng.integers(2)]
-    return EndHinge(d.component, d.magnitude, d.table.geometry.links[d.component].arc_radius * end)
+    place = d.table.geometry.links[d.component].arc_radius * end
+    turn = np.vstack([skew(place), np.eye(3)])
+    return InSeries(
+        d.component, lambda own: d.magnitude * np.trace(own[3:, 3:]) / 3.0 * turn @ turn.T
+    )
 
 
 # The softest grade of the polymer has a quarter of the modulus.
@@ -87,22 +98,23 @@ def drive_compliance(d: Draw) -> Law:
     """Return a linear drive, a stiffening one, or one of which a flank is worn."""
     axis = d.table.geometry.axes[DRIVEN[d.component]]
     if d.form == "stiffening":
-        return StiffeningDrive(DRIVEN[d.component], axis, d.magnitude, 0.01)
+        return Drive(DRIVEN[d.component], axis, partial(stiffening, d.magnitude))
     if d.form == "one_sided":
         lean = d.rng.choice((-1.0, 1.0)) * d.rng.uniform(0.2, 0.5)
         softness = d.magnitude * (1.0 + lean), d.magnitude * (1.0 - lean)
-        return OneSidedDrive(DRIVEN[d.component], axis, softness)
-    axes = d.table.mechanism.a1, d.table.mechanism.a2
-    return MountSpring(d.component, drive_flexibility(d.component, axes, d.magnitude))
+        return Drive(DRIVEN[d.component], axis, partial(one_sided, softness))
+    about = np.concatenate([np.zeros(3), axis])
+    return InSeries(DRIVEN[d.component], lambda own: d.magnitude * np.outer(about, about))
 
 
 # A bracket that gives 10 um at 1 N is seen to move by hand.
 @effect(MOTORS, "m/N", 5e-7, 1e-5, 2e-4)
 def mount_compliance(d: Draw) -> Law:
-    """Return a bracket 20 mm behind the bushing."""
+    """Return a bracket 20 mm behind the bushing, which sits in the frame as the bracket does."""
     seat = Seat.of(d.table.geometry, DRIVEN[d.component])
     place = seat.centre + 0.02 * seat.axis
-    return MountSpring(d.component, d.magnitude * spring(d, place))
+    bracket = d.magnitude * spring(d, place)
+    return InSeries(DRIVEN[d.component], lambda own: bracket)
 
 
 # As a bracket.
@@ -110,14 +122,28 @@ def mount_compliance(d: Draw) -> Law:
 def frame_compliance(d: Draw) -> Law:
     """Return a spring under the limbs."""
     place = d.rng.uniform(-0.05, 0.05, 3)
-    return OuterSpring(d.magnitude * spring(d, place), on_platform=False)
+    flexibility = d.magnitude * spring(d, place)
+
+    def moved(block: Block, state: Equilibrium) -> Array:
+        # All weights hang on it as well.
+        whole = sum(state.through[:, ELASTIC.index(joint)] for joint in DRIVEN.values())
+        return np.asarray(whole) @ flexibility
+
+    return PlatformMotion(moved)
 
 
 # As a bracket.
 @effect(("platform",), "m/N", 5e-7, 1e-5, 2e-4)
 def platform_compliance(d: Draw) -> Law:
     """Return a spring behind the limbs."""
-    return OuterSpring(d.magnitude * spring(d, d.platform_spot), on_platform=True)
+    flexibility = d.magnitude * spring(d, d.platform_spot)
+
+    def moved(block: Block, state: Equilibrium) -> Array:
+        turn = block_diagonal(block.configuration.platform)
+        local = np.einsum("nji,nj->ni", turn, block.load)
+        return np.einsum("nij,nj->ni", turn, local @ flexibility)
+
+    return PlatformMotion(moved)
 
 
 # 200 g are several times the platform, and a tilt of 4 m/s2 is 24 deg.
@@ -181,25 +207,43 @@ def backlash(d: Draw) -> Law:
 @effect(MOTORS, "rad", 2e-4, 0.02, 0.05)
 def encoder_offset(d: Draw) -> Law:
     """Return a wrong zero."""
-    return EncoderOffset(d.component, d.magnitude)
+    return AheadOfEncoder(d.component, lambda angle: np.full_like(angle, d.magnitude))
 
 
 # A disc of 20 mm that is 0.1 mm off its centre.
 @effect(MOTORS, "-", 2e-4, 5e-3, 0.05, ("once", "twice"))
 def encoder_eccentricity(d: Draw) -> Law:
-    """Return a disc off its centre, or oval."""
-    lobes = {"once": 1, "twice": 2}[d.form]
-    return EccentricEncoder(d.component, d.magnitude, d.rng.uniform(0.0, 2.0 * np.pi), lobes)
+    """Return a disc off its centre, or pressed oval, read by one head.
+
+    By exact geometry, not by its first harmonic; the magnitude is the offset of the disc's centre
+    over its radius.
+    """
+    lobes, phase = {"once": 1, "twice": 2}[d.form], d.rng.uniform(0.0, 2.0 * np.pi)
+
+    def ahead(angle: Array) -> Array:
+        at = lobes * angle + phase
+        return np.asarray(np.arctan2(d.magnitude * np.sin(at), 1.0 + d.magnitude * np.cos(at)))
+
+    return AheadOfEncoder(d.component, ahead)
 
 
 # Teeth of the worst grade.
 @effect(MOTORS, "rad", 1e-4, 2e-3, 0.02, ("single", "train"))
 def transmission_error(d: Draw) -> Law:
-    """Return one order or a row of harmonics."""
+    """Return one order, or harmonics of which each is half as high as the one before.
+
+    These are modulated once a turn by the gear's own run-out.
+    """
     count = 1 if d.form == "single" else 3
     orders = d.rng.integers(5, 25) * np.arange(1.0, count + 1.0)
     phases = d.rng.uniform(0.0, 2.0 * np.pi, count)
-    return TransmissionError(d.component, d.magnitude, orders, phases, 0.3 * (count > 1))
+    height = d.magnitude * 0.5 ** np.arange(count)
+
+    def ahead(angle: Array) -> Array:
+        waves = (height * np.sin(orders * angle[:, None] + phases)).sum(axis=-1)
+        return np.asarray(waves * (1.0 + 0.3 * (count > 1) * np.cos(angle)))
+
+    return AheadOfEncoder(d.component, ahead)
 
 
 # A bore that is 0.2 mm and 0.4 deg off is not assembled.
@@ -210,7 +254,7 @@ def axis_misalignment(d: Draw) -> Law:
     across = np.eye(3) - np.outer(axis, axis)
     shift, tilt = unit(across @ d.direction()), unit(across @ d.direction())
     local = d.magnitude * np.concatenate([shift, tilt / LEVER])
-    return AxisMisalignment(d.component, d.seat.to_origin(np.eye(3)) @ local)
+    return BodyScrew(d.component, d.seat.to_origin(np.eye(3)) @ local)
 
 
 # The polymer with the largest growth.
@@ -256,16 +300,21 @@ def cable_wrench(d: Draw) -> Law:
 # Half of the rated force is seen at rest.
 @effect(("load_sensor",), "N", 0.02, 0.5, 5.0, ("constant", "warm_up"))
 def load_bias(d: Draw) -> Law:
-    """Return a bias in a random direction."""
+    """Return a bias in a random direction, there from the start or as the sensor warms up."""
     bias = d.magnitude * np.concatenate([d.direction(), 0.01 * d.direction()])
-    return LoadBias(bias, 0.0 if d.form == "constant" else d.rng.uniform(60.0, 200.0))
+    if d.form == "constant":
+        return LoadReading(lambda block, wrench: wrench + bias)
+    warm_up_s = d.rng.uniform(60.0, 200.0)
+    return LoadReading(
+        lambda block, wrench: wrench + np.outer(-np.expm1(-block.time_s / warm_up_s), bias)
+    )
 
 
 # Another sensor's calibration sheet.
 @effect(("load_sensor",), "-", 0.03, 0.3, 20.0, ("scale",))
 def load_scale(d: Draw) -> Law:
     """Return one gain for all axes."""
-    return LoadMatrix((1.0 + d.magnitude) * np.eye(6))
+    return LoadReading(lambda block, wrench: (1.0 + d.magnitude) * wrench)
 
 
 # A tenth of full scale on the wrong axis: the cable is torn.
@@ -277,28 +326,37 @@ def load_cross_talk(d: Draw) -> Law:
     """
     scale = np.repeat([1.0, 0.01], 3)
     talk = d.rng.normal(size=(6, 6)) * d.magnitude * scale[:, None] / scale
-    return LoadMatrix(np.eye(6) + talk)
+    return LoadReading(lambda block, wrench: wrench + wrench @ talk.T)
 
 
 # 11 deg are seen by eye.
 @effect(("load_sensor",), "rad", 0.03, 0.2, 3.0)
 def load_misalignment(d: Draw) -> Law:
     """Return a sensor turned about a random axis."""
-    return LoadMatrix(turned_sensor(d.magnitude * d.direction()))
+    mounted = Rotation.from_rotvec(d.magnitude * d.direction()).as_matrix()
+    return LoadReading(lambda block, wrench: both_halves(mounted.T, wrench))
 
 
 # As far off as the sensor is long.
 @effect(("load_sensor",), "m", 2e-3, 0.03, 0.5, ("frame", "platform"))
 def load_point(d: Draw) -> Law:
     """Return a lever-arm error in F or in U."""
-    return LoadPoint(d.magnitude * d.direction(), d.form == "platform")
+    point = d.magnitude * d.direction()
+
+    def about(block: Block, wrench: Array) -> Array:
+        at = block.configuration.platform @ point if d.form == "platform" else point
+        force = wrench[:, :3]
+        moment = wrench[:, 3:] - cross(np.broadcast_to(at, force.shape), force)
+        return np.concatenate([force, moment], axis=1)
+
+    return LoadReading(about)
 
 
 # Seen by eye.
 @effect(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
 def measurement_frame(d: Draw) -> Law:
     """Return a registration error of the sensor."""
-    return MeasurementFrame(d.twist())
+    return SensorMotion(d.twist())
 
 
 # Seen by eye.
@@ -311,8 +369,13 @@ def target_mounting(d: Draw) -> Law:
 # 0.1 mm in five minutes: the tripod is not fixed.
 @effect(("pose_sensor",), "m", 5e-6, 1e-4, 1e-2, ("linear", "settling", "daily"))
 def drift(d: Draw) -> Law:
-    """Return a drift that has its magnitude after 5 minutes."""
-    return Drift(d.twist(), 300.0, d.form)
+    """Return a drift that has its magnitude after 5 minutes, or a wave of four times that."""
+    shape: Callable[[Array], Array] = {
+        "linear": lambda x: x,
+        "settling": lambda x: np.expm1(-3.0 * x) / np.expm1(-3.0),
+        "daily": lambda x: np.sin(0.5 * np.pi * x),
+    }[d.form]
+    return SensorMotion(d.twist(), lambda block, rotation: shape(block.time_s / 300.0))
 
 
 # A tenth of a second is a dropped message.

@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.mechanism.vectors import block_diagonal, skew
+from wrist_stiffness.mechanism.vectors import block_diagonal, screws_to_origin, skew
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,7 @@ class Seat:
 
         T maps a screw at the centre in home axes to O in F; its transpose maps a wrench back.
         """
-        move = np.eye(6)
-        move[:3, 3:] = skew(self.centre)
-        return block_diagonal(rotation) @ move
+        return block_diagonal(rotation) @ screws_to_origin(self.centre)
 
     @cached_property
     def rings(self) -> Array:

@@ -17,6 +17,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.simulation.block import joined
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSample, CellSettings, VirtualCell
 from wrist_stiffness.simulation.equilibrium import Pose
@@ -64,15 +65,6 @@ def departure(rotation: Array, shift: Array, base: BasePose) -> Array:
     """Return log(T T_base^-1) at O in F for poses T, (n, 6) [m, rad]."""
     turn = rotation @ np.swapaxes(base.rotation, -1, -2)
     return log_motion(turn, shift - (turn @ base.shift[..., None])[..., 0])
-
-
-def residual(table: Table, sample: CellSample) -> Array:
-    """Return log(T_measured T_base^-1) for the readings of angles and load.
-
-    `sample`: n samples with whole poses.  Gives (n, 6): twist at O in F [m, rad].
-    """
-    base = base_pose(table, sample.encoder, sample.wrench)
-    return departure(sample.measured_rotation, sample.measured_shift, base)
 
 
 def sample_covariance(table: Table, theta: Array, name: str) -> Array:
@@ -136,7 +128,7 @@ class Scale:
             cell.run(time_s, cell.desired(time_s))
             for time_s in np.split(self.time_s, np.arange(BLOCK, len(self.time_s), BLOCK))
         ]
-        return CellSample.joined(blocks)
+        return joined(blocks)
 
     def _loaded_or_moving(self, sample: CellSample) -> NDArray[np.bool_]:
         moving = np.any(np.diff(sample.encoder, axis=0, prepend=sample.encoder[:1]) != 0.0, axis=1)

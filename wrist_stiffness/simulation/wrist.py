@@ -12,7 +12,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.block import Block, joined
 from wrist_stiffness.simulation.equilibrium import Equilibrium, Pose
 from wrist_stiffness.simulation.heat import HeatNetwork
 from wrist_stiffness.simulation.laws.law import Bending, Flowing, Law, Rubbing, no_screws
@@ -92,7 +92,7 @@ class TrueWrist:
         parts: list[Equilibrium] = []
         for first in range(0, len(block.time_s), size):
             parts += self._settled(block, pose, load, screws, slice(first, first + size))
-        return Equilibrium.joined(parts)
+        return joined(parts)
 
     def _settled(
         self, block: Block, pose: Pose, load: Array, screws: Array, rows: slice

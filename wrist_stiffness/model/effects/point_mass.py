@@ -13,6 +13,7 @@ from wrist_stiffness.mechanism.statics import component_rotations, weight_wrench
 from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.columns import Column, Factor, Recipe, Shape, Values, factor
 from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.parameters import Parameter, vector
 from wrist_stiffness.model.situation import Situation
 
@@ -179,13 +180,10 @@ class Inertia(Law):
     ) -> tuple[Contribution, Any]:
         """Return the wrench; the state is the last sample's time and velocity."""
         omega = (at.jacobian @ at.speed[..., None])[..., 0]
-        time, before = state if state else (at.block.time[0], omega[0])
-        interval = np.diff(at.block.time, prepend=time)[:, None]
-        step = np.diff(omega, axis=0, prepend=before[None])
-        alpha = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
+        alpha, state = slope(at.block.time, omega, state)
         arm = at.body("platform") @ vector(values, "{}_mm")
         acceleration = cross(alpha, arm) + cross(omega, cross(omega, arm))
         wrench = np.empty((len(omega), 6))
         wrench[:, :3] = -values["mass_g"] * acceleration
         wrench[:, 3:] = cross(arm, wrench[:, :3]) - values["inertia_gmm2"] * alpha
-        return Contribution(wrench=wrench), (at.block.time[-1], omega[-1])
+        return Contribution(wrench=wrench), state

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
@@ -33,19 +32,23 @@ COUPLED = {"um_per_N": (1e3, 0.5), "mdeg_per_Nm": (1e5, 50.0), "um_per_Nm": (1e5
 """Bound and typical magnitude of a coupling by its unit."""
 
 
-class Spring(Law, ABC):
-    """Compliances along and about x, y and z of the place's body at home, through a point.
+class MountCompliance(Law):
+    """Spring between frame and motor, at the centre of the motor's bushing.
 
+    Compliances along and about x, y and z of the place's body at home, through that point.
     Couplings between them are zero for a spring that lies along these axes and through the point.
     """
 
+    id = "mount_compliance"
     stage = "reaction"
+    places: tuple[str, ...] = MOTORS
+    sentence = "the bracket of {place} gives"
+    check = (
+        "tighten the bracket's screws; put a dial gauge on the motor housing and load the wrist; "
+        "where it stands still, look for a crack at the root of the link"
+    )
+    excited_by = "loads of several directions at poses all over the workspace"
     inexactness = 0.03
-
-    @abstractmethod
-    def centre(self, geometry: Geometry, place: str) -> Array:
-        """Return the point at home, (3,) [m]."""
-
     own = (
         *(Parameter(key, 0.0, 1e3, 1.0) for key in KEYS[:3]),
         *(Parameter(key, 0.0, 1e5, 100.0) for key in KEYS[3:]),
@@ -62,7 +65,7 @@ class Spring(Law, ABC):
 
     def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
         """Return the deflection under the wrench through the place."""
-        point, compliance = self.centre(at.table.geometry, place), _compliance(values)
+        point, compliance = _centre(at.table.geometry, place), _compliance(values)
         local = wrench_at(point, at.at_home(place, at.through_place(place)))
         return at.screw(place, screw_from(point, local @ compliance))
 
@@ -76,24 +79,16 @@ def _compliance(values: Mapping[str, float] | Mapping[str, Array]) -> Array:
     return found
 
 
-class MountCompliance(Spring):
-    """Spring between frame and motor, at the centre of the motor's bushing."""
-
-    id = "mount_compliance"
-    places = MOTORS
-    sentence = "the bracket of {place} gives"
-    check = (
-        "tighten the bracket's screws; put a dial gauge on the motor housing and load the wrist; "
-        "where it stands still, look for a crack at the root of the link"
-    )
-    excited_by = "loads of several directions at poses all over the workspace"
-
-    def centre(self, geometry: Geometry, place: str) -> Array:
-        """Return the centre of the motor's bushing."""
-        return bushing_centre(geometry, MOTOR_JOINT[place])
+def _centre(geometry: Geometry, place: str) -> Array:
+    """Return the point of a place's spring at home, (3,) [m]."""
+    if place == "frame":
+        return np.zeros(3)
+    if place == "platform":
+        return geometry.platform.centre
+    return bushing_centre(geometry, MOTOR_JOINT[place])
 
 
-class FrameCompliance(Spring):
+class FrameCompliance(MountCompliance):
     """Spring between F and both motors, through O."""
 
     id = "frame_compliance"
@@ -102,12 +97,8 @@ class FrameCompliance(Spring):
     check = "tighten the frame's screws; measure a target on the frame while the wrist is loaded"
     excited_by = "loads of several directions and sizes; moments of both signs"
 
-    def centre(self, geometry: Geometry, place: str) -> Array:
-        """Return O."""
-        return np.zeros(3)
 
-
-class PlatformCompliance(Spring):
+class PlatformCompliance(MountCompliance):
     """Spring between the joints' hubs and the plate with tool and target, at the plate's centre."""
 
     id = "platform_compliance"
@@ -115,10 +106,6 @@ class PlatformCompliance(Spring):
     sentence = "the platform, its screws or the tool's holder give"
     check = "tighten the tool's and the target's screws; tap the tool and watch the target"
     excited_by = "loads of several directions at different tilts"
-
-    def centre(self, geometry: Geometry, place: str) -> Array:
-        """Return the plate's centre."""
-        return geometry.platform.centre
 
 
 class DriveCompliance(Law):

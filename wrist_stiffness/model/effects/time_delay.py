@@ -10,6 +10,7 @@ import numpy as np
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.model.law import Contribution, Law, Stage
+from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.situation import Situation
 
@@ -103,11 +104,8 @@ class TimeDelay(Law):
         """Return what happened between the truth and its stamp; the state is the last of it."""
         delay = values["delay_ms"]
         if place == "load_sensor":
-            time, load = state if state else (at.block.time[0], at.load[0])
-            interval = np.diff(at.block.time, prepend=time)[:, None]
-            step = np.diff(at.load, axis=0, prepend=load[None])
-            slope = np.divide(step, interval, out=np.zeros_like(step), where=interval > 0.0)
-            return Contribution(wrench=delay * slope), (at.block.time[-1], at.load[-1])
+            rising, state = slope(at.block.time, at.load, state)
+            return Contribution(wrench=delay * rising), state
         now = Motion(at.block.time, at.block.theta, at.speed)
         motion = Motion(*map(np.concatenate, zip(state, now, strict=True))) if state else now
         kept = motion.since(now.time[-1] - abs(delay))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.vectors import block_diagonal, cross
 from wrist_stiffness.simulation.block import Block
 
 if TYPE_CHECKING:
@@ -19,8 +22,10 @@ class Law:
     """One departure of the true wrist from its base.
 
     Hooks are called once for each block, in the order of time and in the order in which they stand
-    here.  A law with a history advances it in the hook that ends with "and remember".  What hangs
-    on the forces inside the wrist is found together with them: `Bending`, `Flowing`, `Rubbing`.
+    here.  A law with a history advances it in the hook that ends with "and remember"; a copy of the
+    law has a history of its own (so a function that remembers is a `partial` of its memory).  What
+    hangs on the forces inside the wrist is found together with them: `Bending`, `Flowing`,
+    `Rubbing`.
     """
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
@@ -101,6 +106,58 @@ class Rubbing(Law, ABC):
         `state` was found with the friction `acting` (n, 2) in this joint; `give` (n, 3, 2, 2) is
         what a little more of it moves there.
         """
+
+
+@dataclass(frozen=True)
+class LoadReading(Law):
+    """A load sensor that reads another wrench."""
+
+    said: Callable[[Block, Array], Array]  # what it says instead of a wrench, (n, 6)
+
+    def read_load(self, block: Block, wrench: Array) -> Array:
+        """Read it."""
+        return self.said(block, wrench)
+
+
+@dataclass(frozen=True)
+class BodyScrew(Law):
+    """A screw at a component, fixed in the body that carries it."""
+
+    component: str
+    screw: Array  # (6,), at O with the wrist at home [m, rad]
+    share: Callable[[Block], Array] | None = None  # of it at each sample (n,); None for all
+
+    def screws(self, block: Block) -> Array:
+        """Turn it with its body."""
+        turned = block_diagonal(block.rotation(self.component)) @ self.screw
+        if self.share is not None:
+            turned = self.share(block)[:, None] * turned
+        return at_component(block, self.component, np.asarray(turned))
+
+
+@dataclass(frozen=True)
+class PlatformMotion(Law):
+    """A motion of the whole platform besides what the limbs let it do."""
+
+    moved: Callable[[Block, Equilibrium], Array]  # its twist, (n, 6) at O in F [m, rad]
+
+    def twist(self, block: Block, state: Equilibrium) -> Array:
+        """Move the platform."""
+        return self.moved(block, state)
+
+
+@dataclass(frozen=True)
+class PlatformForce(Law):
+    """A force at a point of the platform."""
+
+    place: Array  # (3,), point in U [m]
+    force: Callable[[Block, Array], Array]  # force (n, 3) [N] where the point is, (n, 3), in F [m]
+
+    def wrench(self, block: Block) -> Array:
+        """Move it to O."""
+        at = block.configuration.platform @ self.place
+        force = self.force(block, at)
+        return np.concatenate([force, cross(at, force)], axis=-1)
 
 
 def no_screws(block: Block) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,54 +36,14 @@ class Backlash(Law):
 
 
 @dataclass(frozen=True)
-class EncoderOffset(Law):
-    """A zero that is wrong."""
+class AheadOfEncoder(Law):
+    """A link that stands ahead of its motor's encoder, by what its angle says."""
 
     motor: str
-    offset: float  # link ahead of the reading [rad]
+    ahead: Callable[[Array], Array]  # encoder angles (n,) to link less encoder (n,) [rad]
 
     def turn(self, time_s: Array, shaft: Array) -> Array:
-        """Turn by the offset."""
-        out = np.zeros_like(shaft)
-        out[:, MOTOR[self.motor]] = self.offset
-        return out
-
-
-@dataclass(frozen=True)
-class EccentricEncoder(Law):
-    """A graduated disc off its axis, read by one head: exact geometry, not its first harmonic."""
-
-    motor: str
-    eccentricity: float  # offset of the disc's centre over its radius [-]
-    phase: float  # direction of the offset [rad]
-    lobes: int  # 1, or 2 where the disc was pressed oval
-
-    def turn(self, time_s: Array, shaft: Array) -> Array:
-        """Return the true angle less the read one."""
-        out = np.zeros_like(shaft)
-        column = MOTOR[self.motor]
-        at = self.lobes * shaft[:, column] + self.phase
-        e = self.eccentricity
-        out[:, column] = np.arctan2(e * np.sin(at), 1.0 + e * np.cos(at))
-        return out
-
-
-@dataclass(frozen=True)
-class TransmissionError(Law):
-    """Gear errors of high order, modulated once a turn by the gear's own run-out."""
-
-    motor: str
-    amplitude: float  # [rad]
-    orders: Array  # (k,), waves per turn
-    phases: Array  # (k,) [rad]
-    modulation: float  # share by which the amplitude varies once a turn [-]
-
-    def turn(self, time_s: Array, shaft: Array) -> Array:
-        """Sum the waves; each is half as high as the one before."""
-        out = np.zeros_like(shaft)
-        column = MOTOR[self.motor]
-        x = shaft[:, column, None]
-        height = self.amplitude * 0.5 ** np.arange(len(self.orders))
-        waves = (height * np.sin(self.orders * x + self.phases)).sum(axis=-1)
-        out[:, column] = waves * (1.0 + self.modulation * np.cos(x[:, 0]))
+        """Turn the link of this motor."""
+        out, column = np.zeros_like(shaft), MOTOR[self.motor]
+        out[:, column] = self.ahead(shaft[:, column])
         return out

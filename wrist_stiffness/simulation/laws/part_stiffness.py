@@ -1,13 +1,11 @@
-"""`link_stiffness`, `bushing_stiffness`: a part is softer than its finite elements say."""
+"""`link_stiffness`, `bushing_stiffness`, `mount_compliance`: what is softer than it was drawn."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
-from wrist_stiffness.mechanism.vectors import skew
 from wrist_stiffness.simulation.laws.law import Law
 
 
@@ -36,18 +34,14 @@ class UniformSoftness(Law):
 
 
 @dataclass(frozen=True)
-class EndHinge(Law):
-    """A cracked or badly pressed bore: a link bends more at one end, about all axes there."""
+class InSeries(Law):
+    """A flexibility in series with a component."""
 
-    component: str  # link
-    fraction: float  # extra flexibility at the end over the base's mean rotational one [-]
-    end: Array  # (3,), centre of that bore from O with the wrist at home [m]
+    component: str
+    added: Callable[[Array], Array]  # what comes to its own flexibility, both (6, 6) at O in F
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
-        """Add a rotational spring in series."""
-        flexibility = parts.flexibility.copy()
-        k = ELASTIC.index(self.component)
-        hinge = self.fraction * np.trace(flexibility[k, 3:, 3:]) / 3.0
-        turn = np.vstack([skew(self.end), np.eye(3)])
-        flexibility[k] = flexibility[k] + hinge * turn @ turn.T
+        """Add it."""
+        flexibility, k = parts.flexibility.copy(), ELASTIC.index(self.component)
+        flexibility[k] += self.added(flexibility[k])
         return replace(parts, flexibility=flexibility)

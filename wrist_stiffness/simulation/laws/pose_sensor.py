@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -13,15 +12,20 @@ from wrist_stiffness.simulation.laws.law import Law
 
 
 @dataclass(frozen=True)
-class MeasurementFrame(Law):
-    """The sensor's frame is not F: T_seen = X T."""
+class SensorMotion(Law):
+    """The sensor's frame is not F: T_seen = exp(share X) T."""
 
-    motion: Array  # (6,), X = exp(motion) [m, rad]
+    motion: Array  # (6,), X [m, rad]
+    # of samples and of what was to be seen (n, 3, 3), how much of X is there (n,); None for all
+    share: Callable[[Block, Array], Array] | None = None
 
     def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
-        """Move everything by X."""
-        turn, move = exp_twist(self.motion)
-        return turn @ rotation, shift @ turn.T + move
+        """Move everything by it."""
+        motion = self.motion
+        if self.share is not None:
+            motion = self.share(block, rotation)[:, None] * motion
+        turn, move = exp_twist(motion)
+        return turn @ rotation, (turn @ shift[..., None])[..., 0] + move
 
 
 @dataclass(frozen=True)
@@ -34,23 +38,3 @@ class TargetMounting(Law):
         """Move the target by Y on the platform."""
         turn, move = exp_twist(self.motion)
         return rotation @ turn, shift + rotation @ move
-
-
-@dataclass(frozen=True)
-class Drift(Law):
-    """The sensor's frame wanders slowly."""
-
-    motion: Array  # (6,), after the time `reach_s` [m, rad]
-    reach_s: float  # [s]
-    form: str  # `linear`, `settling` (exponential) or `daily` (a wave of four times the reach)
-
-    def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
-        """Move everything by the drift so far."""
-        x = block.time_s / self.reach_s
-        shape = {
-            "linear": x,
-            "settling": -np.expm1(-3.0 * x) / -np.expm1(-3.0),
-            "daily": np.sin(0.5 * np.pi * x),
-        }[self.form]
-        turn, move = exp_twist(shape[:, None] * self.motion)
-        return turn @ rotation, (turn @ shift[..., None])[..., 0] + move

@@ -1,7 +1,6 @@
-"""Strangers of motion and time.
+"""Strangers with a history of their own, and a prism that is met at an angle.
 
-A tool rings or spins, a pin floats on its oil or sinks in it; something bows, sways, swells or
-works loose.
+A tool rings or spins, a clamp works loose, a pin sinks into its grease, a part yields.
 """
 
 from __future__ import annotations
@@ -13,17 +12,10 @@ from scipy.linalg import expm
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross, dot
-from wrist_stiffness.simulation.block import Block
+from wrist_stiffness.simulation.block import Block, Rate
 from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.joint_friction import joint_turn
-from wrist_stiffness.simulation.laws.law import (
-    JOINED,
-    Bending,
-    Flowing,
-    Law,
-    at_component,
-    no_screws,
-)
+from wrist_stiffness.simulation.laws.law import Bending, Flowing, Law, no_screws
 from wrist_stiffness.simulation.seat import Seat
 
 
@@ -73,36 +65,6 @@ class Resonance(Law):
         return self._steps[dt]
 
 
-class OilFilm(Law):
-    """A turning pin floats up on its lubricant, away from the groove that feeds it.
-
-    `joint`: passive joint; `lift` (3,): greatest lift, across the axis with the wrist at home [m];
-    `speed`: turning speed at which three quarters of it are there [rad/s].
-    """
-
-    def __init__(self, joint: str, seat: Seat, lift: Array, speed: float) -> None:
-        self._joint, self._seat, self._lift, self._speed = joint, seat, lift, speed
-        self._past: tuple[float, float] | None = None
-
-    def screws(self, block: Block) -> Array:
-        """Lift by the speed of the joint's turn."""
-        inner, outer = JOINED[self._joint]
-        bodies = block.configuration.rotations
-        relative = np.swapaxes(bodies[inner], -1, -2) @ bodies[outer]
-        trace = np.einsum("nii->n", relative)
-        turn = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
-        before, past = (block.time_s[0], turn[0]) if self._past is None else self._past
-        steps = np.diff(block.time_s, prepend=before)
-        moved = np.diff(turn, prepend=past)
-        rate = np.divide(moved, steps, out=np.zeros_like(moved), where=steps > 0.0)
-        self._past = float(block.time_s[-1]), float(turn[-1])
-        home = np.concatenate([self._lift, np.zeros(3)])
-        screw = self._seat.to_origin(block.rotation(self._joint)) @ home
-        return at_component(
-            block, self._joint, np.tanh(np.abs(rate) / self._speed)[:, None] * screw
-        )
-
-
 class SpinningTool(Law):
     """The platform feels a gyroscopic moment: by the speed of its tilting, and across it.
 
@@ -112,66 +74,12 @@ class SpinningTool(Law):
     """
 
     def __init__(self, momentum: Array) -> None:
-        self._momentum = momentum
-        self._past: tuple[float, Array] | None = None
+        self._momentum, self._rate = momentum, Rate()
 
     def wrench(self, block: Block) -> Array:
         """Return what the rotor does to the platform while its axis turns."""
-        now = block.configuration.platform @ self._momentum
-        before, past = (block.time_s[0], now[0]) if self._past is None else self._past
-        steps = np.diff(block.time_s, prepend=before)[:, None]
-        change = np.diff(now, axis=0, prepend=past[None])
-        self._past = float(block.time_s[-1]), now[-1]
-        rate = np.divide(change, steps, out=np.zeros_like(change), where=steps > 0.0)
+        rate = self._rate(block.time_s, block.configuration.platform @ self._momentum)
         return np.concatenate([np.zeros_like(rate), -rate], axis=-1)
-
-
-@dataclass(frozen=True)
-class ThermalBow(Law):
-    """The frame bows by the square of the difference in temperature between its two motors."""
-
-    twist_per_kelvin: Array  # (6,), of the platform at a difference of 1 K [m, rad]
-
-    def twist(self, block: Block, state: Equilibrium) -> Array:
-        """Move the platform with the frame."""
-        kelvin = block.temperature_of("motor_1") - block.temperature_of("motor_2")
-        return (kelvin * np.abs(kelvin))[:, None] * self.twist_per_kelvin
-
-
-@dataclass(frozen=True)
-class FloorTilt(Law):
-    """The carrier sways: the platform's weight has a direction that wanders."""
-
-    weight: float  # of platform and tool [N]
-    place: Array  # (3,), centre of gravity in U [m]
-    sway: Array  # (2, 3), two rotation vectors of the sway [rad]
-    periods_s: Array  # (2,) [s]
-
-    def wrench(self, block: Block) -> Array:
-        """Return the change of the weight."""
-        waves = np.sin(2.0 * np.pi * block.time_s[:, None] / self.periods_s)
-        down = np.array([0.0, 0.0, -self.weight])
-        force = cross(waves @ self.sway, np.broadcast_to(down, (len(waves), 3)))
-        at = block.configuration.platform @ self.place
-        return np.concatenate([force, cross(at, force)], axis=-1)
-
-
-@dataclass(frozen=True)
-class Swelling(Law):
-    """A bushing swells and dries with a humidity that nobody records."""
-
-    joint: str
-    screw: Array  # (6,), at O with the wrist at home at 1 [m, rad]
-    # `periods_s`, `phases`: (k,), of the humidity's waves [s], [rad]
-    periods_s: Array
-    phases: Array
-
-    def screws(self, block: Block) -> Array:
-        """Follow the humidity."""
-        angle = 2.0 * np.pi * block.time_s[:, None] / self.periods_s + self.phases
-        wet = np.sin(angle).mean(axis=-1)
-        turned = block_diagonal(block.rotation(self.joint)) @ self.screw
-        return at_component(block, self.joint, wet[:, None] * turned)
 
 
 class LooseningScrew(Bending):
@@ -239,3 +147,68 @@ class SqueezeFilm(Flowing):
         if remember:
             self._past = float(before), float(angle), sunk
         return np.einsum("nij,nj->ni", to_origin, out)
+
+
+class Switch:
+    """Two states; it changes where a signal leaves a band, and remembers."""
+
+    def __init__(self, band: float) -> None:
+        self._band, self._on = band, False
+
+    def __call__(self, signal: Array) -> Array:
+        """Return the state (n,) as 0 or 1 for a signal (n,)."""
+        out = np.empty(len(signal))
+        for i, value in enumerate(signal):
+            if abs(value) > self._band:
+                self._on = bool(value > 0.0)
+            out[i] = self._on
+        return out
+
+
+class PlasticSet(Flowing):
+    """A part yields a little whenever a load is larger than all before, and stays bent.
+
+    `direction` (6,): of screw and wrench at O with the wrist at home; unit in force.  `per_newton`:
+    set per force beyond the yield point [m/N].  `yielding`: yield point [N].
+    """
+
+    def __init__(
+        self, component: str, direction: Array, per_newton: float, yielding: float
+    ) -> None:
+        self.component = component
+        self._direction, self._per_newton = direction, per_newton
+        self._worst = np.full(2, yielding)
+        self._yielding = yielding
+
+    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
+        """Set grows with the largest load so far, to each side on its own."""
+        turn = block_diagonal(block.rotation(self.component))
+        load = np.einsum("nji,nj->ni", turn, wrench) @ self._direction
+        both = np.stack([load, -load], axis=-1)
+        worst = np.maximum(np.maximum.accumulate(both, axis=0), self._worst)
+        bent = self._per_newton * ((worst - self._yielding) @ np.array([1.0, -1.0]))
+        if remember:
+            self._worst = worst[-1]
+        return bent[:, None] * (turn @ self._direction)
+
+
+@dataclass(frozen=True)
+class PrismIncidence(Law):
+    """The tracker's position is off along its beam, by the angle at which that meets the prism.
+
+    Light that enters the glass at an angle takes another way than its distance constant says:
+    depth * (n - sqrt(n^2 - sin^2 angle)) too short, as the prism turns with the platform.
+    """
+
+    depth: float  # of the glass that the sensor's settings leave out [m]
+    beam: Array  # (3,), direction in F from target to sensor, unit vector
+    face: Array  # (3,), normal of the prism's face in U, unit vector
+
+    GLASS = 1.52
+    """Refractive index of the prism, n."""
+
+    def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
+        """Move the target towards the sensor."""
+        sine_2 = 1.0 - ((rotation @ self.face) @ self.beam) ** 2
+        short = self.depth * (self.GLASS - np.sqrt(self.GLASS**2 - sine_2))
+        return rotation, shift + short[:, None] * self.beam
