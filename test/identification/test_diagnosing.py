@@ -77,7 +77,7 @@ def test_a_drive_that_is_softer_one_way_is_named_and_its_law_gives(model, in_the
     if form == "linear":
         assert finding.gives == {}
         return
-    soft, stiff = build(hidden, model.table).softness
+    _, (soft, stiff) = build(hidden, model.table).wound(None, np.array([1.0, -1.0]))
     value, error = finding.gives["asymmetry"]
     assert abs(abs(value) - abs(soft - stiff) / (soft + stiff)) < 3.0 * error < 0.1
     assert "growth" not in finding.gives
