@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wrist_stiffness.identification.proposal import Proposal, twins
-from wrist_stiffness.model.formula_law import LOAD_SENSOR, TURNS
+from wrist_stiffness.model.formula_law import LOAD_SENSOR, TOOL, TURNS
 
 POSE = ("theta_1", "theta_2")
 RATES = ("theta_dot_1", "theta_dot_2")
@@ -76,8 +76,13 @@ RIGHT = {
 
 
 def right_components(effect: str, place: str) -> tuple[str, ...]:
-    """Return the components at which a law about a stranger is true."""
-    return RIGHT[effect].components or (place, *twins(place))
+    """Return the components at which a law about a stranger is true.
+
+    The lists know one place of a wrench that no sensor tells; a law says whether it turns with the
+    platform.
+    """
+    found = RIGHT[effect].components or (place, *twins(place))
+    return (*found, TOOL) if LOAD_SENSOR in found else found
 
 
 def follows(form: str) -> set[str]:

@@ -266,10 +266,11 @@ def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_b
         (["along (1, -2, 2)"], [1 / 3, -2 / 3, 2 / 3, 0, 0, 0]),
         (["along", "0.6", "0", "-0.8"], [0.6, 0, -0.8, 0, 0, 0]),
         (["0", "0", "1e-6", "-1", "0", "0"], [0, 0, 1e-6, -1, 0, 0]),
+        (["along +z;", "about -x"], [[0, 0, 1, 0, 0, 0], [0, 0, 0, -1, 0, 0]]),
     ],
 )
 def test_a_direction_is_taken_in_the_words_of_compare(words, direction):
-    assert direction_of(words) == pytest.approx(direction, abs=1e-4)
+    assert direction_of(words) == pytest.approx(np.array(direction), abs=1e-4)
 
 
 @pytest.mark.parametrize("words", ["along (0, 0, 0)", "about (1, inf, 0)", "along nan nan nan"])

@@ -209,6 +209,54 @@ def test_a_formula_at_the_load_sensor_is_a_wrench_that_it_does_not_say(model, ma
     assert np.allclose(one.measured, two.measured, rtol=1e-9, atol=1e-15)
 
 
+def test_a_formula_at_the_tool_is_a_wrench_that_turns_with_the_platform(model, make):
+    block = make.rest((20.0, -15.0), (0.5, -0.7, 1.1), n=2)
+    turn = model.table.mechanism.forward(block.theta).rotations["platform"][0]
+    along, fy = (
+        np.array([0, 0.6, 0.8]),
+        " + ".join(
+            f"{part!r} * W_f{axis}" for part, axis in zip(turn[:, 1].tolist(), "xyz", strict=True)
+        ),
+    )
+    none, changes = np.zeros(3), []
+    for place, way, text in (("tool", along, "fy"), ("load_sensor", turn @ along, f"({fy})")):
+        law = FormulaLaw("pull", place, np.append(way, none), f"p_N * {text}", (), ("p_N",))
+        changes.append(make.added(model, Effect(law, place).with_values({"p_N": 0.3}), block))
+    assert np.abs(turn - np.eye(3)).max() > 0.1
+    assert np.abs(changes[0]).max() > 1e-7
+    assert np.allclose(*changes, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("place", ["link_2", "tool"])
+def test_two_formulas_along_two_directions_are_the_sum_of_both(model, make, place):
+    block, along = make.block(), np.array([[0, 0.8, 0.6, 0, 0, 1.0], [1.0, 0, 0, 0.2, 0, 0]])
+    key = "p_N" if place == "tool" else "p_um"
+    texts = [f"{key} * lag(theta_1, 2)", f"{key} * play(fy, 0.1)"]
+    laws = [FormulaLaw(f"n{n}", place, along[n], texts[n], (), (key,)) for n in (0, 1)]
+    both = FormulaLaw("both", place, along, ", ".join(texts), (), (key,))
+    made = [Effect(law, place).with_values({key: 0.3}) for law in (*laws, both)]
+    two, one = model.with_effects().batch_with(block, [tuple(made[:2]), (made[2],)])
+    bare = model.with_effects().batch_with(block, [()])[0]
+    assert np.abs(one.measured - bare.measured).max() > 1e-9
+    assert np.allclose(one.measured, two.measured, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize(("text", "count"), [("p_um, p_um * fx", 2), ("p_um", 1), ("p_um,", 1)])
+def test_as_many_formulas_as_directions(text, count):
+    for rows in {1, 2, 3} - {count}:
+        with pytest.raises(InputError, match=rf"own: {count} formulas .*, but {rows} directions"):
+            FormulaLaw("own", "frame", np.eye(6)[:rows], text, (), ("p_um",))
+    assert (
+        len(FormulaLaw("own", "frame", np.eye(6)[:count], text, (), ("p_um",)).direction) == count
+    )
+
+
+def test_commas_part_whole_formulas_only():
+    for text in ("1 + (fx, k)", "((fx, k), k)", "()", "sin(fx, k)"):
+        with pytest.raises(InputError, match="formula .* column"):
+            Formula(text, NAMES)
+
+
 def test_turns_of_passive_joints_are_those_of_the_bodies_they_join(model):
     theta = np.radians([[20.0, -15.0], [-10.0, 30.0]])
     pose, axes = model.table.mechanism.forward(theta), model.table.geometry.axes

@@ -51,7 +51,8 @@ def add_parser(commands: Commands) -> None:
         metavar="D",
         help="which way, in the words of compare ('along +z', 'about (-0.38, -0.88, 0.29)'), or "
         "the screw for a value of 1 in six numbers, translation [m] and rotation [rad]; at O in "
-        "the component's home frame; at load_sensor the wrench [N, N m] at O in F",
+        "the component's home frame; at load_sensor the wrench [N, N m] at O in F, at tool "
+        "that in U; of several formulas, 'ONE, OTHER', as many: 'along +x; along +y'",
     )
     own.add_argument("--name", default="own_formula", help="its name (default: own_formula)")
     usual = "size of a parameter that would not surprise, in the unit of its name (default: 1)"

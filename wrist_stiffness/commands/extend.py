@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wrist_stiffness.commands.calibrate import writable
 from wrist_stiffness.commands.fit_values import fit_values, parameter_values
@@ -18,6 +19,7 @@ from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, wa
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.extension import Extension, extend
 from wrist_stiffness.identification.free_effects import unfitted
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula import names_in
 from wrist_stiffness.model.formula_law import SIGNALS, FormulaLaw
@@ -32,14 +34,15 @@ AXIS = re.compile(r"(?P<sign>[+-]?)(?P<name>[xyz])")
 """How `compare` names directions."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FormulaEffect:
     """A formula; what in it is neither a signal nor a covariate is a parameter."""
 
     id: str
     component: str
-    # screw for a value of 1, at O in the component's home frame [m, rad]
-    direction: Sequence[float]
+    # screw for a value of 1, at O in the component's home frame [m, rad]: (6,), or one for each
+    # formula between commas (r, 6)
+    direction: ArrayLike
     expression: str  # see `model.formula_law`
     # values of parameters from which the fit begins; 1 where there is none
     start: Mapping[str, float]
@@ -77,15 +80,20 @@ def own_effect(name: str) -> Effect:
     return Effect(law_from_file(reference, Path.cwd()), component)
 
 
-def direction_of(words: Sequence[str]) -> list[float]:
+def direction_of(words: Sequence[str]) -> Array:
     """Return the screw that a user names, translation [m] and rotation [rad] for a value of 1.
 
     `words`: six numbers; or "along" (a shift) or "about" (a turn) with an axis such as "+z" or
     three numbers such as "(-0.38, -0.88, 0.29)", of which only the direction counts: `compare`
-    rounds them, and a parameter in um should be the way in um.  Raises `InputError` if it is
-    neither, or the three numbers are no direction.
+    rounds them, and a parameter in um should be the way in um; of several formulas as many, between
+    semicolons.  Gives (6,), or of several (r, 6).  Raises `InputError` if it is neither, or the
+    three numbers are no direction.
     """
-    text = " ".join(words)
+    found = np.array([_direction_of(text) for text in " ".join(words).split(";")])
+    return found if len(found) > 1 else found[0]
+
+
+def _direction_of(text: str) -> list[float]:
     kind, *rest = re.sub(r"[(),]", " ", text).split() or [""]
     axis = AXIS.fullmatch(" ".join(rest)) if kind in KINDS else None
     if axis:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -39,6 +39,16 @@ LATE = 6
 """Time constants that are tried, from a second to half of the longest recording."""
 
 EVERYWHERE = "poses all over the workspace"
+
+LINEAR = ("a share", "a late follower", "a passing answer")
+"""Sorts of law that answer to a vector whatever the axes that it is written in."""
+
+VECTORS = (
+    ("theta_dot_1", "theta_dot_2"),
+    ("theta_1", "theta_2"),
+    *(tuple(f"{on}{kind}{axis}" for axis in "xyz") for on in ("", "W_") for kind in "fm"),
+)
+"""Signals that are the parts of one vector: speeds and angles of both motors, forces, moments."""
 
 USUAL_RANGES = {"K": 5.0, "N": 1.0, "N m": 0.03, "rad": 0.3, "rad/s": 1.0}
 """How much a signal usually changes, by its unit: a motor that warms up, what a cell's tool pushes,
@@ -85,6 +95,9 @@ class Form:
         What a recording must have to show it.
     usual : float
         Value of the formula at which the law has its usual size.
+    parts : tuple of Form
+        Of a vector the form of each of its signals, which act along directions of their own; these
+        tell how it is written.
     """
 
     kind: str
@@ -94,6 +107,12 @@ class Form:
     tell: Callable[[Shape], str]
     needs: str
     usual: float = 1.0
+    parts: tuple[Form, ...] = ()
+
+    @property
+    def each(self) -> tuple[Form, ...]:
+        """Itself, or those of the signals of a vector."""
+        return self.parts or (self,)
 
     @property
     def shapes(self) -> list[Shape]:
@@ -159,7 +178,7 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
     angles = [name for name in moving if name in (*motors, *TURNS)]
     warm = [name for name in moving if name.startswith(TEMPERATURE)]
     others = [name for name in moving if name not in (*angles, *warm)]
-    found = [each for name in others for each in _of_signal(name, pooled[name], late)]
+    found: list[Form] = [each for name in others for each in _of_signal(name, pooled[name], late)]
     found += [each for name in angles for each in _of_angle(name, pooled[name], late)]
     found += [each for name in warm for each in _of_warmth(name, pooled[name], late)]
     for pair in combinations(warm, 2):
@@ -172,6 +191,15 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
     found += _of_time(pooled["time"], length)
     slow = [name for name in moving if "dot" not in name and name not in TURNS]
     found += [_together(*pair, pooled) for pair in combinations((*slow, "time"), 2)]
+    vectors = [(kind, [{name} for name in vector]) for kind in LINEAR for vector in VECTORS]
+    for by, vector in product((*warm, "time"), VECTORS):
+        vectors.append(("a product", [{name, by} for name in vector]))
+    for kind, signals_of in vectors:
+        parts = tuple(each for each in found if each.kind == kind and set(each.of) in signals_of)
+        if len(parts) > 1:
+            of = tuple(dict.fromkeys(name for each in parts for name in each.of))
+            needs = "; ".join(each.needs for each in parts)
+            found.append(replace(parts[0], of=of, needs=needs, parts=parts))
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.optimize import minimize
@@ -22,6 +23,7 @@ from wrist_stiffness.model.formula_law import (
     LOAD_SENSOR,
     MOTION,
     TEMPERATURE,
+    TOOL,
     TURNS,
     WRENCH,
 )
@@ -31,8 +33,9 @@ from wrist_stiffness.model.situation import Situation
 PLACES = (
     *tuple({(LIMB[name], BODY[name]): name for name in reversed(LIMB)}.values())[::-1],
     LOAD_SENSOR,
+    TOOL,
 )
-"""One component of each set in which a screw does the very same, and the load sensor."""
+"""One component of each set in which a screw does the very same, and where a wrench is."""
 
 USUAL = {"size_um": 5.0, "size_mdeg": 20.0, "size_N": 0.1, "size_Nmm": 2.0}
 """Usual size of a law over a recording, standard deviation (assumed): that of a gap in a fit, of a
@@ -61,19 +64,19 @@ STEPS = 40
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """A form at a component in some directions, at its best shape so far."""
+    """A form of r numbers at a component in k directions, at its best shape so far."""
 
     form: Form
     place: int
     free: tuple[int, ...]
     shape: Shape
     gain: float
-    z: Array
+    z: Array  # (r, k)
 
 
 def key_of(place: str, axis: int) -> str:
     """Return the parameter of a law's size along an axis of a screw, or of a wrench."""
-    if place == LOAD_SENSOR:
+    if place in (LOAD_SENSOR, TOOL):
         return "size_N" if axis < 3 else "size_Nmm"
     return "size_um" if axis < 3 else "size_mdeg"
 
@@ -94,23 +97,24 @@ class Library:
             np.eye(numbers).reshape(-1, fit.table.table.n_components, numbers)
         )
         self._known: dict[str, Array | None] = {}
-        self._points: list[list[tuple[Form, Shape]]] = []
-        self._rows: list[Array] = []
-        self._among: list[Array] = []
+        self._points: list[list[list[tuple[Form, Shape, Array]]]] = []
         kinds = 0
         for place, signals in enumerate(self._signals):
-            points: list[tuple[Form, Shape]] = []
-            rows: list[Array] = []
+            points: dict[int, list[tuple[Form, Shape, Array]]] = {}
             for form in forms(signals):
-                asked = [(shape, self._row(form, shape, place)) for shape in form.shapes]
-                points += [(form, shape) for shape, row in asked if row is not None]
-                rows += [row for _, row in asked if row is not None]
-                kinds += any(row is not None for _, row in asked)
-            self._points.append(points)
-            self._rows.append(np.array(rows).reshape(len(rows), -1))
-            self._among.append(np.log([len(form.shapes) for form, _ in points]))
+                asked = [(shape, self._rows(form, shape, place)) for shape in form.shapes]
+                kept = [(form, shape, rows) for shape, rows in asked if rows is not None]
+                points.setdefault(len(form.each), []).extend(kept)
+                kinds += bool(kept)
+            self._points.append(list(points.values()))
         self.price = float(np.log(OUTSIDE / max(kinds, 1)))
-        self.count = sum(map(len, self._points)) * len(DIRECTIONS)
+        self.count = sum(len(own) for place in self._points for own in place) * len(DIRECTIONS)
+
+    def _rows(self, form: Form, shape: Shape, place: int) -> Array | None:
+        """Return the numbers of a form (r, u), as `_row`; None if one is constant."""
+        found = [self._row(each, shape, place) for each in form.each]
+        rows = [row for row in found if row is not None]
+        return np.array(rows) if len(rows) == len(found) else None
 
     def _row(self, form: Form, shape: Shape, place: int) -> Array | None:
         """Return a form on the units of the table in usual sizes, (u,); None if it is constant."""
@@ -131,12 +135,13 @@ class Library:
     def leaders(self, beyond: Beyond) -> list[Asked]:
         """Return the laws that are worth more than their first order."""
         best: dict[tuple[str, int, int], Asked] = {}
-        for place in range(len(PLACES)):
-            for number, free in enumerate(DIRECTIONS):
-                gains, z = beyond.gains(self._rows[place], place, free)
-                gains = gains - PRICES[len(free)] - self._among[place]
-                for n, (form, shape) in enumerate(self._points[place]):
-                    gain, key = float(gains[n]), (form.name, place, number)
+        for place, every in enumerate(self._points):
+            for points, (number, free) in product(every, enumerate(DIRECTIONS)):
+                gains, z = beyond.gains(np.array([rows for _, _, rows in points]), place, free)
+                gains = gains - PRICES[len(free)]
+                for n, (form, shape, _) in enumerate(points):
+                    gain = float(gains[n] - np.log(len(form.shapes)))
+                    key = form.name, place, number
                     if key not in best or best[key].gain < gain:
                         best[key] = Asked(form, place, free, shape, gain, z[n])
         chosen: list[Asked] = []
@@ -157,7 +162,7 @@ class Library:
     ) -> tuple[Asked, float]:
         """Return a law at its best numbers, and the log prior of these as far as they are known.
 
-        `gain` tells what a form on the units gains, and its unknowns.
+        `gain` tells what a form (r, u) on the units gains, and its unknowns (r, k).
         """
         moving = [n for n, span in enumerate(law.form.spans) if not span.fixed]
         price = -sum(float(np.log(len(span.grid))) for span in law.form.spans if span.fixed)
@@ -174,10 +179,10 @@ class Library:
             return tuple(own)
 
         def cost(x: Array) -> float:
-            row = self._row(law.form, shape(x), law.place)
-            if row is None:
+            rows = self._rows(law.form, shape(x), law.place)
+            if rows is None:
                 return 1e9
-            return -gain(row)[0]
+            return -gain(rows)[0]
 
         start = np.array(
             [
@@ -194,17 +199,22 @@ class Library:
             bow = (cost(best.x + aside) + cost(best.x - aside) - 2.0 * best.fun) / aside[n] ** 2
             width = np.sqrt(2.0 * np.pi / bow) if bow > 0.0 else 1.0
             price += float(np.log(min(width, 1.0)))
-        row = self._row(law.form, shape(best.x), law.place)
-        if row is None:
+        rows = self._rows(law.form, shape(best.x), law.place)
+        if rows is None:
             return law, price
-        return replace(law, shape=shape(best.x), z=gain(row)[1]), price
+        return replace(law, shape=shape(best.x), z=gain(rows)[1]), price
 
     def moved(self, law: Asked, parts: Array) -> Array:
-        """Return what typical screws (k, u, m) do as large as a law says."""
-        row = self._row(law.form, law.shape, law.place)
-        if row is None:
+        """Return what typical screws (k, u, m) do as large as a law says, (r k, u, m)."""
+        rows = self._rows(law.form, law.shape, law.place)
+        if rows is None:
             raise AssertionError(law.form.name)
-        return np.asarray(parts * row[None, :, None])
+        return spread(rows, parts)
+
+
+def spread(rows: Array, parts: Array) -> Array:
+    """Return what typical screws (k, u, m) do as large as numbers (r, u) say, (r k, u, m)."""
+    return (rows[:, None, :, None] * parts).reshape(-1, *parts.shape[1:])
 
 
 def _range(span: Span) -> tuple[float, float]:
@@ -232,26 +242,27 @@ class Beyond:
             self._known[key] = np.einsum("uvb,vb->uv", left, self._carried[place, two])
         return self._known[key]
 
-    def gain(self, place: int, free: Sequence[int], row: Array) -> tuple[float, Array]:
-        """Return the gain of a form (u,), and its unknowns (k,)."""
-        gains, z = self.gains(row[None], place, free)
+    def gain(self, place: int, free: Sequence[int], rows: Array) -> tuple[float, Array]:
+        """Return the gain of a form (r, u), and its unknowns (r, k)."""
+        gains, z = self.gains(rows[None], place, free)
         return float(gains[0]), z[0]
 
     def gains(self, rows: Array, place: int, free: Sequence[int]) -> tuple[Array, Array]:
-        """Return gains (n,) of log evidence and unknowns (n, k) of forms (n, u)."""
-        count = len(free)
-        information = np.empty((len(rows), count, count))
-        slope = np.empty((len(rows), count))
+        """Return gains (n,) of log evidence and unknowns (n, r, k) of forms (n, r, u)."""
+        n, r, k = *rows.shape[:2], len(free)
+        information, slope = np.empty((n, r, k, r, k)), np.empty((n, r, k))
         for i, one in enumerate(free):
             own = np.einsum("ua,ua->u", self._carried[place, one], self._slope)
-            slope[:, i] = rows @ own
+            slope[..., i] = rows @ own
             for j, two in enumerate(free[i:], i):
-                both = np.einsum("nu,nu->n", rows @ self._pair(place, one, two), rows)
-                information[:, i, j] = information[:, j, i] = both
-        found = [_modes(information, slope, near) for near in (1.0, 1e-8)]
+                both = rows @ self._pair(place, one, two) @ rows.swapaxes(1, 2)
+                information[:, :, i, :, j] = both
+                information[:, :, j, :, i] = both.swapaxes(1, 2)
+        flat = information.reshape(n, r * k, r * k), slope.reshape(n, r * k)
+        found = [_modes(*flat, near) for near in (1.0, 1e-8)]
         better = found[0][0] >= found[1][0]
         gains = np.where(better, found[0][0], found[1][0])
-        return gains, np.where(better[:, None], found[0][1], found[1][1])
+        return gains, np.where(better[:, None], found[0][1], found[1][1]).reshape(n, r, k)
 
 
 def _modes(information: Array, slope: Array, near: float) -> tuple[Array, Array]:
@@ -301,6 +312,7 @@ def _loads(at: Situation, place: str) -> dict[str, Array]:
     if place == LOAD_SENSOR:
         names, loads = [f"W_{axis}" for axis in WRENCH], at.wrench
     else:
-        names, loads = list(WRENCH), at.at_home(place, at.through_place(place))
+        own = "platform" if place == TOOL else place
+        names, loads = list(WRENCH), at.at_home(own, at.through_place(own))
     turns = {n: at.turn(joint) for n, joint in TURNS.items() if joint in (place, *twins(place))}
     return dict(zip(names, loads.T, strict=True)) | turns

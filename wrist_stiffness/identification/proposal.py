@@ -13,7 +13,7 @@ from wrist_stiffness.identification.forms import EVERYWHERE, Form, Shape
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula import names_in
-from wrist_stiffness.model.formula_law import LOAD_SENSOR, SIGNALS, FormulaLaw
+from wrist_stiffness.model.formula_law import LOAD_SENSOR, SIGNALS, TOOL, FormulaLaw, words_of
 from wrist_stiffness.model.parameters import Estimate, si_factor
 from wrist_stiffness.model.places import BODY, LIMB
 
@@ -21,6 +21,7 @@ SAME: dict[str, tuple[str, ...]] = {
     "frame": ("the stand of the instrument",),
     "platform": ("the target on it",),
     LOAD_SENSOR: ("whatever pulls at the platform",),
+    TOOL: ("whatever pulls and turns with the platform",),
 }
 """What does exactly the same and is none of the wrist."""
 
@@ -61,9 +62,9 @@ class Proposal:
         Numbers inside the form.
     component : str
         Where.
-    direction : (6,) float
-        Translation; rotation at O in the component's home frame, for a size of 1; that of `key`
-        has length 1 [m, rad; N, N m].
+    direction : (r, 6) float
+        Translation; rotation at O in the component's home frame, for a size of 1, one for each
+        formula of the form; those of `key` have length 1 together [m, rad; N, N m].
     value, sigma : float
         Size and its standard uncertainty, in the unit of `key`.
     key : str
@@ -94,25 +95,14 @@ class Proposal:
     @property
     def formula(self) -> str:
         """In the grammar of `extend --formula`."""
-        return f"{self.key} * {self.form.write(self.shape)}"
+        return ", ".join(f"{self.key} * {each.write(self.shape)}" for each in self.form.each)
 
     @property
     def way(self) -> str:
-        """Direction as `extend --direction` takes it: `along +z`, or six numbers."""
-        if self.direction[:3].any() and self.direction[3:].any():
-            return " ".join(f"{each:.4g}" for each in self.direction)
-        return self._words(self.key)
-
-    def _words(self, key: str) -> str:
-        turns = key in TURNING
-        three = self.direction[3:] if turns else self.direction[:3]
-        own = three / np.linalg.norm(three)
-        axis = int(np.argmax(np.abs(own)))
-        if abs(own[axis]) == 1.0:
-            words = f"{'+' if own[axis] > 0.0 else '-'}{'xyz'[axis]}"
-        else:
-            words = f"({', '.join(f'{each:.2f}' for each in own)})"
-        return f"{'about' if turns else 'along'} {words}"
+        """Direction as `extend --direction` takes it: `along +z`, or six numbers; or several."""
+        if len(self.direction) > 1 or (self.direction[:, :3].any() and self.direction[:, 3:].any()):
+            return words_of(self.direction)
+        return _words(self.direction[0], self.key)
 
     @property
     def places(self) -> str:
@@ -122,15 +112,26 @@ class Proposal:
     @property
     def sentence(self) -> str:
         """What it says of the wrist."""
-        digits = max(0, 1 - int(np.floor(np.log10(max(self.sigma, 1e-9)))))
-        size = f"{self.value:.{digits}f} +- {self.sigma:.{digits}f} {_unit(self.key)}"
-        screw = f"{size} {self._words(self.key)}"
-        other = BESIDE[self.key]
-        beside = np.linalg.norm(self.direction[:3] if self.key in TURNING else self.direction[3:])
+        told = [
+            f"{self._screw(row)}{{}} {form.tell(self.shape)}"
+            for row, form in zip(self.direction, self.form.each, strict=True)
+        ]
+        return " and ".join(told).format(f" at {self.places}", *[""] * (len(told) - 1))
+
+    def _screw(self, row: Array) -> str:
+        """Return how large it is along one direction, in words."""
+        other, turns = BESIDE[self.key], self.key in TURNING
+        parts = (row[3:], row[:3]) if turns else (row[:3], row[3:])
+        length, beside = (float(np.linalg.norm(part)) for part in parts)
+        value, sigma = self.value * length, self.sigma * length
+        digits = max(0, 1 - int(np.floor(np.log10(max(sigma, 1e-9)))))
+        screw = (
+            f"{value:.{digits}f} +- {sigma:.{digits}f} {_unit(self.key)} {_words(row, self.key)}"
+        )
         if beside:
             more = self.value * si_factor(self.key) / si_factor(other) * beside
-            screw += f" and {more:.3g} {_unit(other)} {self._words(other)}"
-        return f"{screw} at {self.places} {self.form.tell(self.shape)}"
+            screw += f" and {more:.3g} {_unit(other)} {_words(row, other)}"
+        return screw
 
     def effect(self, name: str = "proposed") -> Effect:
         """Return it as an effect of a model."""
@@ -159,6 +160,19 @@ class Proposal:
             "explains": self.explains,
             "sentence": self.sentence,
         }
+
+
+def _words(row: Array, key: str) -> str:
+    """Return the direction of a shift or a turn in words, `along +z`."""
+    turns = key in TURNING
+    three = row[3:] if turns else row[:3]
+    own = three / np.linalg.norm(three)
+    axis = int(np.argmax(np.abs(own)))
+    if abs(own[axis]) == 1.0:
+        words = f"{'+' if own[axis] > 0.0 else '-'}{'xyz'[axis]}"
+    else:
+        words = f"({', '.join(f'{each:.2f}' for each in own)})"
+    return f"{'about' if turns else 'along'} {words}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from wrist_stiffness.identification.law_library import (
     Beyond,
     Library,
     key_of,
+    spread,
 )
 from wrist_stiffness.identification.proposal import Proposal, Proposals
 from wrist_stiffness.identification.wrist_fit import WristFit
@@ -59,7 +60,7 @@ class _Judged:
     law: Asked
     change: Array
     state: Evidence
-    z: Array
+    z: Array  # (r, k)
     log: float
     price: float
 
@@ -151,21 +152,22 @@ def _distinct(found: Sequence[_Judged]) -> list[_Judged]:
         known = best.setdefault(key, each)
         if known is not each:
             best[key] = replace(known, log=float(np.logaddexp(known.log, each.log)))
-    return sorted(best.values(), key=lambda each: -each.log)
+    return sorted(best.values(), key=_log, reverse=True)
 
 
 def _proposal(found: _Judged, chance: float, before: Evidence) -> Proposal:
     law, state = found.law, found.state
     place, free = PLACES[law.place], list(law.free)
-    at, z = state.point.effects[PROPOSED], found.z
-    spread = float(np.sqrt(z @ state.covariance[np.ix_(at, at)] @ z)) / float(z @ z)
+    at, z = state.point.effects[PROPOSED], found.z.ravel()
+    wide = float(np.sqrt(z @ state.covariance[np.ix_(at, at)] @ z)) / float(z @ z)
     keys = [key_of(place, axis) for axis in range(6)]
-    usual = np.array([USUAL[key] * si_factor(key) for key in keys]) / law.form.usual
-    screw, sizes = np.zeros(6), np.zeros(6)
-    screw[free], sizes[free] = z * usual[free], z
+    sizes = np.zeros((len(found.z), 6))
+    sizes[:, free] = found.z
+    screw = sizes * [USUAL[key] * si_factor(key) for key in keys]
+    screw /= np.array([[form.usual] for form in law.form.each])
     # Its size is that of the shift or of the turn, whichever is less usual.
-    turns = np.linalg.norm(sizes[3:]) > np.linalg.norm(sizes[:3])
-    size = float(np.linalg.norm(screw[3:] if turns else screw[:3]))
+    turns = np.linalg.norm(sizes[:, 3:]) > np.linalg.norm(sizes[:, :3])
+    size = float(np.linalg.norm(screw[:, 3:] if turns else screw[:, :3]))
     key = keys[5 if turns else 0]
     value = size / si_factor(key)
     had, left = (each.without_discrepancy().square for each in (before, state))
@@ -177,7 +179,7 @@ def _proposal(found: _Judged, chance: float, before: Evidence) -> Proposal:
         place,
         screw / size,
         value,
-        spread * value,
+        wide * value,
         key,
         chance,
         found.log - before.log,
@@ -247,13 +249,14 @@ class _Search:
         parts = self._carriers(fit, [(law.place, axis) for axis in law.free])
         law = replace(law, z=z)
         bare = fit.without_numbers(effect.name)
-        change = np.einsum("i,iua->ua", z, self.library.moved(law, parts))
+        change = np.einsum("i,iua->ua", z.ravel(), self.library.moved(law, parts))
         bare = replace(bare, left=bare.left + self._table.whiten(change))
         here = replace(first.state, point=bare)
 
-        def gain(row: Array) -> tuple[float, Array]:
-            moved = parts * row[None, :, None]
-            return here.gains([-self._table.whiten(np.moveaxis(moved, 0, -1))])[0]
+        def gain(rows: Array) -> tuple[float, Array]:
+            moved = np.moveaxis(spread(rows, parts), 0, -1)
+            log, own = here.gains([-self._table.whiten(moved)])[0]
+            return log, own.reshape(z.shape)
 
         refined = self._judged(*self.library.refined(law, gain), parts, bare, first.state)
         return max(first, refined, key=_log)
@@ -262,14 +265,15 @@ class _Search:
         self, law: Asked, price: float, parts: Array, point: Point, state: Evidence
     ) -> _Judged:
         """Return a law beside a point where it is absent, with amplitudes near those of a state."""
-        moved, table = self.library.moved(law, parts), self._table
-        change = np.einsum("i,iua->ua", law.z, moved)
+        moved, table, z = self.library.moved(law, parts), self._table, law.z.ravel()
+        change = np.einsum("i,iua->ua", z, moved)
         left = point.left - table.whiten(change)
         columns = -table.whiten(np.moveaxis(moved, 0, -1))
         varied = table.varied(change)
-        grown = point.with_effect(PROPOSED, left, columns, law.z, varied, FormulaLaw.inexactness)
+        grown = point.with_effect(PROPOSED, left, columns, z, varied, FormulaLaw.inexactness)
         found = evidence(grown, state.background, state)
         places = grown.effects[PROPOSED]
         z = found.point.z[places] + found.step[places]
         log = found.log + price + self.library.price - PRICES[len(law.free)]
-        return _Judged(law, np.einsum("i,iua->ua", z, moved), found, z, log, price)
+        change = np.einsum("i,iua->ua", z, moved)
+        return _Judged(law, change, found, z.reshape(law.z.shape), log, price)

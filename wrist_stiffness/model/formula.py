@@ -158,6 +158,11 @@ class Formula:
         """Variables that the expression does use."""
         return names_in(self.text)
 
+    @property
+    def count(self) -> int:
+        """Number of formulas that it has between commas."""
+        return len(self._tree.elts) if isinstance(self._tree, ast.Tuple) else 1
+
     @cached_property
     def remembers(self) -> bool:
         """Whether its value depends on earlier samples."""
@@ -168,7 +173,8 @@ class Formula:
         """Return the value for variables of n samples.
 
         `values`: at least the `names`; `past`: of a formula that remembers; brought up to the last
-        sample.  Gives (n,) float or float: not finite where the formula is not defined.
+        sample.  Gives (n,) float or float, of r formulas between commas (n, r) or (r,): not finite
+        where the formula is not defined.
         """
         with np.errstate(all="ignore"):
             return np.asarray(_value(self._tree, values, past or Past(np.zeros(1))), dtype=float)
@@ -207,6 +213,10 @@ class Formula:
     def _check(self, node: ast.expr, depth: int) -> None:
         if depth > DEEPEST:
             raise self._refusal(node, f"nested deeper than {DEEPEST} levels")
+        if depth == 0 and isinstance(node, ast.Tuple) and node.elts:
+            for each in node.elts:
+                self._check(each, 1)
+            return
         if isinstance(node, ast.Constant):
             if isinstance(node.value, bool) or not isinstance(node.value, int | float):
                 raise self._refusal(node, f"{node.value!r} is not a number")
@@ -247,6 +257,9 @@ class Formula:
 
 def _value(node: ast.expr, values: Mapping[str, Value], past: Past) -> Value:
     match node:
+        case ast.Tuple(elts=parts):
+            own = [_value(part, values, past) for part in parts]
+            return np.stack(np.broadcast_arrays(*own), axis=-1)
         case ast.Constant(value=number):
             return float(number)  # type: ignore[arg-type]
         case ast.Name(id=name):

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
@@ -32,20 +33,29 @@ SIGNALS = frozenset(
 )
 """What every formula may use."""
 
-LOAD_SENSOR = "load_sensor"
-"""Component at which a formula is no screw but a wrench that the load sensor does not say."""
+LOAD_SENSOR, TOOL = "load_sensor", "tool"
+"""Components at which a formula is no screw but a wrench on the platform that the load sensor does
+not say: fixed in the cell, and turning with the platform."""
 
-FORMULA_PLACES = (*LIMB, LOAD_SENSOR)
+FORMULA_PLACES = (*LIMB, LOAD_SENSOR, TOOL)
 """Components of a formula."""
+
+
+def words_of(direction: ArrayLike) -> str:
+    """Return a direction, or several, as `extend --direction` takes them."""
+    rows = np.atleast_2d(direction)
+    return "; ".join(" ".join(f"{number:.4g}" for number in row) for row in rows)
 
 
 class FormulaLaw(Law):
     """A screw along a fixed direction of the component's body, as large as a formula says.
 
-    At the load sensor it is a wrench in F on the platform, beyond what the sensor says [N, N m].
+    At the load sensor it is a wrench on the platform, beyond what the sensor says, at O in F; at
+    the tool the same in U [N, N m].
 
-    `name`: id of the effect.  `place`: its component.  `direction` (6,): (translation; rotation) at
-    O in the component's home frame for a value of 1 [m, rad].  `expression`: in `theta_1`,
+    `name`: id of the effect.  `place`: its component.  `direction` (6,) or (r, 6): (translation;
+    rotation) at O in the component's home frame for a value of 1 [m, rad], of as many formulas as
+    the expression has between commas; their screws add up.  `expression`: in `theta_1`,
     `theta_2` [rad], `theta_dot_1`, `theta_dot_2` [rad/s], `turn_2` ... `turn_4` (turns of the
     passive joints from home [rad]), `fx` ... `mz` (wrench through the component at O in its home
     frame [N, N m]), `W_fx` ... `W_mz` (wrench on the platform at O in F), `T_<component>` [degC],
@@ -71,15 +81,16 @@ class FormulaLaw(Law):
         if place not in FORMULA_PLACES:
             known = ", ".join(FORMULA_PLACES)
             raise InputError(f"{name}: component {place!r} is not one of {known}")
-        if direction.shape != (6,) or not np.isfinite(direction).all() or not direction.any():
+        rows = np.atleast_2d(direction)
+        if rows.shape[1:] != (6,) or not np.isfinite(rows).all() or not rows.any(axis=1).all():
             raise InputError(
                 f"{name}: direction {direction.tolist()} is not six finite numbers, one not zero"
             )
         self.id = name
-        self.stage = "load" if place == LOAD_SENSOR else "reaction"
+        self.stage = "load" if place in (LOAD_SENSOR, TOOL) else "reaction"
         self.places = (place,)
         self.sentence = f"{{place}}: {expression}"
-        self.direction = direction
+        self.direction = rows
         self.covariates = tuple(covariates)
         # Their first value is 1: a formula may divide by them.
         self.own = tuple(
@@ -91,6 +102,10 @@ class FormulaLaw(Law):
             if own in SIGNALS or own in COUNTS or (*covariates, *keys).count(own) > 1:
                 raise InputError(f"{name}: the name {own} is in use")
         self.formula = Formula(expression, (*sorted(SIGNALS), *self.covariates, *keys))
+        if self.formula.count != len(rows):
+            raise InputError(
+                f"{name}: {self.formula.count} formulas {expression!r}, but {len(rows)} directions"
+            )
         self.signals = tuple(
             used
             for used in sorted(self.formula.names)
@@ -103,16 +118,21 @@ class FormulaLaw(Law):
         """Return the screw."""
         variables = {name: self._signal(at, place, name, values) for name in self.formula.names}
         past = Past(at.block.time, dict(state or {}))
-        size = np.broadcast_to(self.formula(variables, past), len(at.block))
+        value = self.formula(variables, past)
+        if len(self.direction) == 1:
+            value = value[..., None]
+        size = np.broadcast_to(value, (len(at.block), len(self.direction)))
         if not np.isfinite(size).all():
-            row = int(np.argmin(np.isfinite(size)))
+            row = int(np.argmin(np.isfinite(size).all(axis=1)))
             there = {
                 name: float(np.broadcast_to(v, len(size))[row]) for name, v in variables.items()
             }
             per_si = {each.key: 1.0 / si_factor(each.key) for each in self.own}
             told = f"{self.id}: {self.formula.undefined(there, per_si)}"
             raise UndefinedFormulaError(told, float(at.block.time[row]))
-        screws = np.outer(size, self.direction)
+        screws = size @ self.direction
+        if place == TOOL:
+            screws = at.in_base("platform", screws)
         load = self.stage == "load"
         return Contribution(wrench=screws) if load else at.screw(place, screws), past.states or None
 
@@ -133,6 +153,7 @@ class FormulaLaw(Law):
             return at.configuration.turn(joint, at.table.geometry.axes[joint])
         if name in MOTION:
             return np.concatenate([at.block.theta, at.speed], axis=1)[:, MOTION.index(name)]
-        if name.startswith("W_") or self.stage == "load":
+        if name.startswith("W_") or place == LOAD_SENSOR:
             return at.wrench[:, WRENCH.index(name.removeprefix("W_"))]
+        place = "platform" if place == TOOL else place
         return at.at_home(place, at.through_place(place))[:, WRENCH.index(name)]

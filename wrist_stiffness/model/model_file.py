@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from wrist_stiffness.atomic_file import writing
@@ -24,6 +25,7 @@ from wrist_stiffness.inputs.schema import (
 )
 from wrist_stiffness.lookup.table import EVALUATIONS, Evaluation
 from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.formula_law import FormulaLaw
@@ -46,6 +48,12 @@ def _estimate(node: Node) -> Estimate:
     return Estimate(number()(node))
 
 
+def _directions(node: Node) -> Array:
+    """Read a screw (6,), or a list of them (r, 6)."""
+    many = isinstance(node.value, list) and any(isinstance(each, list) for each in node.plain)
+    return np.array(list_of(vector(6))(node)) if many else vector(6)(node)
+
+
 def _joint(effects: list[str], **values: float) -> JointUncertainty:
     return JointUncertainty.of_values(tuple(effects), values)
 
@@ -55,7 +63,7 @@ PARAMETERS = {"parameters": mapping_of(_estimate)}
 CATALOGUE = record(PLACED, PARAMETERS)
 USERS_LAW = record({**PLACED, "class": text()}, PARAMETERS)
 USERS_FORMULA = record(
-    {**PLACED, "id": text(), "direction": vector(6), "expression": text()},
+    {**PLACED, "id": text(), "direction": _directions, "expression": text()},
     {**PARAMETERS, "covariates": list_of(text())},
 )
 MODEL = record(
@@ -220,7 +228,7 @@ def _entry(effect: Effect, folder: Path) -> dict[str, Any]:
     own: dict[str, Any] = {"effect": law.id, "component": effect.component}
     if isinstance(law, FormulaLaw):
         own = {"effect": FORMULA, "id": law.id, "component": effect.component}
-        own["direction"] = law.direction.tolist()
+        own["direction"] = (law.direction if len(law.direction) > 1 else law.direction[0]).tolist()
         own["expression"] = law.formula.text
         if law.covariates:
             own["covariates"] = list(law.covariates)

@@ -36,6 +36,7 @@ from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
 from wrist_stiffness.inference.giving import told
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.formula_law import words_of
 from wrist_stiffness.model.model_file import file_sha256, load_model, save_model
 from wrist_stiffness.planning.loads_file import Weight
 from wrist_stiffness.planning.plan import Conditions
@@ -221,8 +222,8 @@ class Bench:
         else:
             common = [set(each.block.covariates) for each in self._opened.sessions]
             asked = candidate.effect(sorted(set.intersection(*common)))
-            way = " ".join(f"{number:g}" for number in candidate.direction)
             option = f"--formula {shlex.quote(candidate.expression)} --component "
+            way = shlex.quote(words_of(candidate.direction))
             option += f"{candidate.component} --direction {way} --name {candidate.id}"
         self._tell(f"fitting {asked if isinstance(asked, str) else asked.name}")
         seen = self._opened.preview(asked)
