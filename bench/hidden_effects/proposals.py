@@ -29,8 +29,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import blind_strangers
+import newer_strangers
 from bench_wrist import Array, wrist
-from blind_strangers import BLIND, register
 from cases import Case, one_each
 from observe import hidden_effects, observe
 from rates import wilson
@@ -54,13 +55,22 @@ FIRST_SEED = 7001
 
 STRETCHES = 12
 
+BLIND = {
+    "by another author": blind_strangers.BLIND,
+    "by a third author": newer_strangers.NEWER,
+}
+"""Strangers whose authors had not seen how laws are proposed; each list was asked once first."""
+
 
 def cases(sizes: Sequence[float], sound: int) -> list[Case]:
-    """Return strangers at one place each, sound wrists, and strangers by another author."""
+    """Return strangers at one place each, sound wrists, and strangers by other authors."""
     found = [Case((place,), size) for place in one_each(STRANGERS) for size in sizes]
     found += [Case((), 0.0)] * sound
-    register()
-    found += [Case((place,), size) for place in one_each(BLIND) for size in sizes]
+    for others in (blind_strangers, newer_strangers):
+        others.register()
+    found += [
+        Case((place,), size) for own in BLIND.values() for place in one_each(own) for size in sizes
+    ]
     return [replace(case, seed=FIRST_SEED + n) for n, case in enumerate(found)]
 
 
@@ -188,9 +198,11 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
     strange = [each for each in lines if each["truth"] and "nothing" in each]
     sound = [each for each in lines if not each["truth"]]
     rows = ["| effect, size | removed of what the process removes | component | law |", "|-|-|-|-|"]
-    seen, blind, predicted, predicted_blind = [], [], [], []
-    others = {law for law, _, _ in one_each(BLIND)}
+    lists = ("", *BLIND)
+    seen: dict[str, list[dict[str, bool]]] = {name: [] for name in lists}
+    predicted: dict[str, list[dict[str, bool]]] = {name: [] for name in lists}
     for each in strange:
+        own = ["", *(name for name, entries in BLIND.items() if each["truth"][0] in entries)]
         beyond = 3.0 * np.sqrt(2.0 * each["numbers"])
         gains = {name: each["nothing"] - each[name] for name in ("law", "process")}
         right = {key: each[key] for key in ("right_component", "right_sentence")}
@@ -198,30 +210,24 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
         above = each["nothing"] - each["numbers"]
         if above > beyond:
             halved = {"half of the error above noise removed": gains["law"] >= above / 2}
-            seen.append(right | halved)
-            if each["truth"][0] in others:
-                blind.append(right | halved)
+            for name in own:
+                seen[name].append(right | halved)
         told = "the process removes nothing"
         if gains["process"] > beyond:
             share = gains["law"] / gains["process"]
             halved = {"half of what the process removes": share >= 0.5}
-            predicted.append(right | halved)
-            if each["truth"][0] in others:
-                predicted_blind.append(right | halved)
+            for name in own:
+                predicted[name].append(right | halved)
             told = f"{100.0 * share:.0f} %"
         where = next((told for key, told in WHERE.items() if each[key]), "-")
         laws = "; ".join(each["laws"]) or "none"
         rows.append(f"| {'@'.join(each['truth'])}, {each['size']:g} | {told} | {where} | {laws} |")
-    known = (
-        ("above the noise", seen),
-        ("by another author", blind),
-        ("predicted by the process", predicted),
-        ("by another author predicted by the process", predicted_blind),
-    )
-    for whose, kept in known:
-        for what in kept[0] if kept else ():
-            hits = sum(bool(each[what]) for each in kept)
-            rows.append(_rate(f"strangers {whose}: {what.replace('_', ' ')}", hits, len(kept)))
+    for which, known in (("above the noise", seen), ("predicted by the process", predicted)):
+        for name, kept in known.items():
+            whose = " ".join(filter(None, ("strangers", name, which)))
+            for what in kept[0] if kept else ():
+                hits = sum(each[what] for each in kept)
+                rows.append(_rate(f"{whose}: {what.replace('_', ' ')}", hits, len(kept)))
     rows.append(_rate("sound wrists: no law", sum(not x["laws"] for x in sound), len(sound)))
     for low, high in ((0.95, 1.01), (0.3, 0.95), (0.0, 0.3)):
         told = [each for each in strange if each["laws"] and low <= each["probability"] < high]
