@@ -149,6 +149,22 @@ def test_a_clamp_that_comes_loose_is_told_by_all_forces_and_the_time(model, day)
     assert "link_3" in (found.terms[0].component, *twins(found.terms[0].component))
 
 
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("dip_um * exp(7 * (cos(2 * 3.14159 * time / 37.3 + 2) - 1))", "a pulse of time"),
+        ("dip_um * (time / 29 + 0.3 - floor(time / 29 + 0.3))", "a saw-tooth of time"),
+        ("dip_um * exp(-(theta_dot_2 ** 2) / 0.002)", "a rest of theta_dot_2"),
+    ],
+)
+def test_what_comes_again_and_again_and_what_is_there_at_rest(model, day, text, kind):
+    way = [0.8, 0.6, 0, 0, 0, 0]
+    found = proposed(model, planted(model, day, "frame", way, text, dip_um=12.0))
+    law = found.terms[0]
+    assert (law.form.name, law.component) == (kind, "frame")
+    assert law.value * law.direction[0] == pytest.approx(12.0 * np.array(way), abs=2.0)
+
+
 def test_beside_an_effect_that_is_named_a_law_is_proposed_for_the_rest(model, day, monkeypatch):
     # Of all others the answer would be the same, a minute later.
     asked = [(find_law("backlash"), place) for place in ("motor_1", "motor_2")]

@@ -35,6 +35,15 @@ half ranges of the angles."""
 SLACKS = (0.05, 0.2, 0.5)
 """Slacks of play that are tried, in half ranges of the signal."""
 
+SHARPNESS, BEATS = (4.0, 15.0), tuple(1.0 + n / 6.0 for n in range(37))
+"""How sharp a pulse may be, 0.16 and 0.08 of a period long, and how often what is sharp may repeat
+in a recording: in steps that move its last one hardly farther than its length."""
+
+TURN = "6.2832"
+
+RESTS = (0.01, 0.05, 0.2)
+"""Speeds below which a motor may rest, in half ranges of the speed."""
+
 LATE = 6
 """Time constants that are tried, from a second to half of the longest recording."""
 
@@ -184,6 +193,9 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
     for pair in combinations(warm, 2):
         if _moves(apart := pooled[pair[0]] - pooled[pair[1]]):
             found += _of_warmth(f"({' - '.join(pair)})", apart, late)
+    if {"theta_dot_1", "theta_dot_2"} <= set(moving):
+        speeds = ("theta_dot_1", "theta_dot_2")
+        found.append(_rest(speeds, max(_half_range(pooled[name]) for name in speeds)))
     if len(motors) == 2:
         one, two = (pooled[name] for name in motors)
         found += [_wave("(theta_1 - theta_2)", one - two), _wave("(theta_1 + theta_2)", one + two)]
@@ -252,12 +264,28 @@ def _of_signal(name: str, values: Array, late: Span) -> list[Form]:
                  lambda s: f"{every} of either sign", needs, u)
         )  # fmt: skip
     if "dot" in name:
+        found.append(_rest((name,), half))
         found.append(
             Form("warmth by motion", of, (late,), lambda s: f"lag({name} ** 2, {number(s[0])})",
                  lambda s: f"{every} squared, {number(s[0])} s late",
                  f"minutes of fast motion of motor {name[-1]}, then minutes of rest", u**2)
         )  # fmt: skip
     return found
+
+
+def _rest(of: tuple[str, ...], half: float) -> Form:
+    """Return what is there at rest alone: of a brake, of a controller, of air that stands."""
+    slow = Span(tuple(half * each for each in RESTS), positive=True)
+    squares = " + ".join(f"{name} ** 2" for name in of)
+    who = " and ".join(f"motor {name[-1]}" for name in of)
+    return Form(
+        "a rest",
+        of,
+        (slow,),
+        lambda s: f"exp(-({squares}) / {number(s[0] ** 2)})",
+        lambda s: f"while {who} rests, below {number(s[0])} rad/s",
+        f"moves and rests of {who} in turn, at the same poses",
+    )
 
 
 def _usual(name: str, values: Array) -> float:
@@ -384,7 +412,13 @@ def _of_time(time: Array, length: float) -> list[Form]:
     moments = Span(tuple(np.quantile(time, np.linspace(0.0, 1.0, MOMENTS + 2)[1:-1])), fixed=True)
     rates = Span(tuple(2.0 * np.pi * 0.5 * n / length for n in range(2, 41)))
     late = Span(tuple(np.geomspace(max(2.0, 0.02 * length), length, LATE)), positive=True)
+    beats = Span(tuple(2.0 * np.pi * n / length for n in BEATS))
+    turns = Span(tuple(np.pi * n / 3.0 for n in range(6)))
     again = "the same poses over and over, for as long as possible"
+
+    def turn(s: Shape) -> str:
+        return f"({number(s[0])} * {since} + {number(s[1])})"
+
     return [
         Form("a drift", of, (), lambda s: f"{since} / 3600", lambda s: "for every hour", again,
              float(time.std()) / 3600.0),
@@ -396,6 +430,13 @@ def _of_time(time: Array, length: float) -> list[Form]:
              lambda s: f"as a wave of {number(2.0 * np.pi / s[0])} s in time", again),
         Form("a passing answer", of, (late,), lambda s: f"exp(-{since} / {number(s[0])})",
              lambda s: f"dying away in {number(s[0])} s from the start", again),
+        Form("a pulse", of, (beats, turns, Span(SHARPNESS, positive=True)),
+             lambda s: f"exp({number(s[2])} * (cos({turn(s)}) - 1))",
+             lambda s: f"as a pulse of {number(2.0 / s[0] / np.sqrt(s[2]))} s every "
+             f"{number(2.0 * np.pi / s[0])} s", again),
+        Form("a saw-tooth", of, (beats, turns),
+             lambda s: f"({turn(s)} / {TURN} - floor({turn(s)} / {TURN}))",
+             lambda s: f"as a ramp that begins anew every {number(2.0 * np.pi / s[0])} s", again),
     ]  # fmt: skip
 
 

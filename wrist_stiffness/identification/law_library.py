@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import groupby, product
 
 import numpy as np
 from scipy.optimize import minimize
@@ -138,12 +138,14 @@ class Library:
         for place, every in enumerate(self._points):
             for points, (number, free) in product(every, enumerate(DIRECTIONS)):
                 gains, z = beyond.gains(np.array([rows for _, _, rows in points]), place, free)
-                gains = gains - PRICES[len(free)]
-                for n, (form, shape, _) in enumerate(points):
-                    gain = float(gains[n] - np.log(len(form.shapes)))
+                first = 0
+                for form, run in groupby(form for form, _, _ in points):
+                    own = slice(first, first := first + sum(1 for _ in run))
+                    n = own.start + int(np.argmax(gains[own]))
+                    gain = float(gains[n] - PRICES[len(free)] - np.log(len(form.shapes)))
                     key = form.name, place, number
                     if key not in best or best[key].gain < gain:
-                        best[key] = Asked(form, place, free, shape, gain, z[n])
+                        best[key] = Asked(form, place, free, points[n][1], gain, z[n])
         chosen: list[Asked] = []
         seats: set[tuple[str, int]] = set()
         for each in sorted(best.values(), key=lambda own: -own.gain):
@@ -249,13 +251,14 @@ class Beyond:
 
     def gains(self, rows: Array, place: int, free: Sequence[int]) -> tuple[Array, Array]:
         """Return gains (n,) of log evidence and unknowns (n, r, k) of forms (n, r, u)."""
-        n, r, k = *rows.shape[:2], len(free)
+        (n, r, u), k = rows.shape, len(free)
         information, slope = np.empty((n, r, k, r, k)), np.empty((n, r, k))
         for i, one in enumerate(free):
             own = np.einsum("ua,ua->u", self._carried[place, one], self._slope)
             slope[..., i] = rows @ own
             for j, two in enumerate(free[i:], i):
-                both = rows @ self._pair(place, one, two) @ rows.swapaxes(1, 2)
+                known = (rows.reshape(-1, u) @ self._pair(place, one, two)).reshape(n, r, u)
+                both = np.einsum("nau,nbu->nab", known, rows)
                 information[:, :, i, :, j] = both
                 information[:, :, j, :, i] = both.swapaxes(1, 2)
         flat = information.reshape(n, r * k, r * k), slope.reshape(n, r * k)

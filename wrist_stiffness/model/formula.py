@@ -43,6 +43,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Value]]] = {
     "abs": (1, np.abs),
     "tanh": (1, np.tanh),
     "sign": (1, np.sign),
+    "floor": (1, np.floor),
     "min": (2, np.minimum),
     "max": (2, np.maximum),
 }
