@@ -67,7 +67,8 @@ def mesh_solid(shape: OCCGeometry) -> SolidMesh:
 def generate_mesh(shape: OCCGeometry) -> NetgenMesh:
     """Let netgen mesh a shape; a `GeometryError` if it cannot."""
     try:
-        return shape.GenerateMesh()
+        # Its threads make the same mesh and wait for each other five times as long.
+        return shape.GenerateMesh(parallel_meshing=False)
     except NgException as error:
         raise GeometryError(f"the mesher gave up on a part: {error}") from error
 
