@@ -301,10 +301,10 @@ def _wall_equations(model: WristAtPose, first: NDArray[np.int64], own: int) -> I
                 masters = np.flatnonzero(np.abs(row) > NEGLIGIBLE)
                 if len(masters) == 0:
                     continue
-                way = ways[unknown]
+                way = slice(*ways.indptr[unknown : unknown + 2])
                 terms = [
                     (int(start) + dof // 3, dof % 3 + 1, value)
-                    for dof, value in zip(way.indices, way.data, strict=True)
+                    for dof, value in zip(ways.indices[way], ways.data[way], strict=True)
                     if abs(value) > NEGLIGIBLE
                 ]
                 terms.sort(key=lambda term: -abs(term[2]))
