@@ -246,12 +246,12 @@ def _summed(
     screw, screw_slide, screw_twist = (np.empty((*r.shape[:-3], len(own), k)) for k in (6, 3, 6))
     for component in np.unique(own):
         alike = own == component
-        turned = both_halves(r[..., component, None, :, :], sectors.screw[mine][alike])
-        screw[..., alike, :] = turned
-        screw_slide[..., alike, :] = turned[..., :3] @ np.swapaxes(
-            rows[..., component, :, :], -1, -2
-        )
-        screw_twist[..., alike, :] = both_halves(g[..., component, None, :, :], turned)
+        # Half-vectors below each other: one product for all sectors.
+        back, carried, moved = (np.swapaxes(m[..., component, :, :], -1, -2) for m in (r, g, rows))
+        turned = sectors.screw[mine][alike].reshape(-1, 3) @ back
+        screw[..., alike, :] = turned.reshape(*turned.shape[:-2], -1, 6)
+        screw_slide[..., alike, :] = turned[..., ::2, :] @ moved
+        screw_twist[..., alike, :] = (turned @ carried).reshape(*turned.shape[:-2], -1, 6)
     # Half of a symmetric sum.
     half = 0.5 * slide_flexibility @ sectors.slide.T
     half[..., mine] += np.swapaxes(screw_slide, -1, -2)
