@@ -80,7 +80,7 @@ def _panel(axes: Any, line: Line) -> None:
     axes.tick_params(labelsize=7)
     axes.set_title(f"{'@'.join(line['truth'])}\n", fontsize=9, loc="left")
     style = {"color": colour(2), "weight": "bold"} if line["right_sentence"] else {"color": FLOOR}
-    size = 6.8 if len(_law(line)) < 44 else 5.4
+    size = 6.8 if len(_law(line)) < 44 else 5.4 if len(_law(line)) < 52 else 4.6
     law = axes.text(0.0, 1.04, _law(line), fontsize=size, transform=axes.transAxes, **style)
     law.set_in_layout(False)
 

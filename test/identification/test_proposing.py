@@ -145,7 +145,7 @@ def test_a_clamp_that_comes_loose_is_told_by_all_forces_and_the_time(model, day)
     text = ", ".join(f"soft_um * f{axis} * (time - {day.block.time[0]:.3f})" for axis in "xyz")
     ways = np.concatenate([[[0.6, 0, 0], [0, 1.0, 0.3], [0, 0.3, 0.8]], np.zeros((3, 3))], axis=1)
     found = proposed(model, planted(model, day, "link_3", ways, text, soft_um=0.3))
-    assert found.terms[0].form.name == "a product of fx and time and fy and fz"
+    assert found.terms[0].form.name == "a product of fx, fy, fz and time"
     assert "link_3" in (found.terms[0].component, *twins(found.terms[0].component))
 
 

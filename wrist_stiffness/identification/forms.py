@@ -131,7 +131,8 @@ class Form:
     @property
     def name(self) -> str:
         """Sort and signals, as a person reads them."""
-        return f"{self.kind} of {' and '.join(self.of)}"
+        *others, last = self.of
+        return f"{self.kind} of {', '.join(others)}{' and ' if others else ''}{last}"
 
 
 def evaluated(text: str, signals: Sequence[Mapping[str, Array]]) -> list[Array]:
@@ -209,7 +210,10 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
     for kind, signals_of in vectors:
         parts = tuple(each for each in found if each.kind == kind and set(each.of) in signals_of)
         if len(parts) > 1:
-            of = tuple(dict.fromkeys(name for each in parts for name in each.of))
+            # What all of them have in common comes last.
+            names = dict.fromkeys(name for each in parts for name in each.of)
+            common = set.intersection(*(set(each.of) for each in parts))
+            of = tuple(sorted(names, key=common.__contains__))
             needs = "; ".join(each.needs for each in parts)
             found.append(replace(parts[0], of=of, needs=needs, parts=parts))
     return found
