@@ -113,10 +113,12 @@ class Proposal:
     def sentence(self) -> str:
         """What it says of the wrist."""
         told = [
-            f"{self._screw(row)}{{}} {form.tell(self.shape)}"
+            (self._screw(row), form.tell(self.shape))
             for row, form in zip(self.direction, self.form.each, strict=True)
         ]
-        return " and ".join(told).format(f" at {self.places}", *[""] * (len(told) - 1))
+        if len(told) == 1:
+            return f" at {self.places} ".join(told[0])
+        return f"at {self.places}: " + "; ".join(" ".join(each) for each in told)
 
     def _screw(self, row: Array) -> str:
         """Return how large it is along one direction, in words."""
