@@ -206,7 +206,7 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
         ),
         (
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * __import__('os').x()", {}),
-            "only numbers, names, .* and the functions sin, cos, .* are allowed",
+            "only numbers, names, .* the functions sin, cos, .* are allowed",
         ),
     ],
 )
@@ -280,10 +280,22 @@ def test_an_axis_without_a_direction_is_refused(words):
 
 
 @pytest.mark.parametrize(
-    "words", ["", "up", "along", "along +w", "along 1 2", "about 1 2 3 4", "1 2 3", "0 0 1 0 0 z"]
+    "words",
+    [
+        "",
+        "along +x;",
+        "along +x, along +y",
+        "up",
+        "along",
+        "along +w",
+        "along 1 2",
+        "about 1 2 3 4",
+        "1 2 3",
+        "0 0 1 0 0 z",
+    ],
 )
 def test_a_direction_that_is_none_is_one_line(words):
-    with pytest.raises(InputError, match="write six numbers .* or as compare says 'along"):
+    with pytest.raises(InputError, match="write six numbers .* 'along .*; several between ';'"):
         direction_of(words.split())
 
 

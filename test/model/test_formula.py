@@ -244,7 +244,8 @@ def test_two_formulas_along_two_directions_are_the_sum_of_both(model, make, plac
 @pytest.mark.parametrize(("text", "count"), [("p_um, p_um * fx", 2), ("p_um", 1), ("p_um,", 1)])
 def test_as_many_formulas_as_directions(text, count):
     for rows in {1, 2, 3} - {count}:
-        with pytest.raises(InputError, match=rf"own: {count} formulas .*, but {rows} directions"):
+        match = rf"own: .* has commas for {count} formulas, but there are directions for {rows}"
+        with pytest.raises(InputError, match=match):
             FormulaLaw("own", "frame", np.eye(6)[:rows], text, (), ("p_um",))
     assert (
         len(FormulaLaw("own", "frame", np.eye(6)[:count], text, (), ("p_um",)).direction) == count
@@ -252,9 +253,29 @@ def test_as_many_formulas_as_directions(text, count):
 
 
 def test_commas_part_whole_formulas_only():
-    for text in ("1 + (fx, k)", "((fx, k), k)", "()", "sin(fx, k)"):
-        with pytest.raises(InputError, match="formula .* column"):
+    for text in ("1 + (fx, k)", "((fx, k), k)", "()"):
+        with pytest.raises(InputError, match="formula .* column .* commas between whole formulas"):
             Formula(text, NAMES)
+
+
+def test_what_is_remembered_on_several_lines_is_kept_apart():
+    """As a YAML block has it: the same column on two lines."""
+    names, time = ("a", "b"), np.arange(8.0)
+    values = {"a": np.sin(time), "b": np.cos(time)}
+    for one, two in (("lag(a, 2)", "lag(b, 3)"), ("lag(a, 2)", "play(b, 0.2)")):
+        each = [Formula(text, names)(values, Past(time)) for text in (one, two)]
+        both, found = Formula(f"(\n{one},\n{two})", names), []
+        past = Past(time[:3])
+        for own in (slice(0, 3), slice(3, 8)):
+            past = Past(time[own], past.states)
+            found.append(both({name: value[own] for name, value in values.items()}, past))
+        assert np.concatenate(found) == pytest.approx(np.column_stack(each))
+
+
+def test_what_is_undefined_by_its_past_is_told():
+    formula = Formula("log(lag(a, 2)), 1", ("a",))
+    told = formula.undefined({"a": 5.0})
+    assert told == "log(lag(a, 2)), 1 has no finite value after what was before"
 
 
 def test_turns_of_passive_joints_are_those_of_the_bodies_they_join(model):

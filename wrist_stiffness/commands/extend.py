@@ -68,7 +68,10 @@ class FormulaEffect:
                 f"{self.id}: the formula {self.expression!r} has no parameter to fit; multiply it "
                 "by one, 'size_um * ...'"
             )
-        direction = np.array(self.direction, dtype=float)
+        try:
+            direction = np.array(self.direction, dtype=float)
+        except ValueError:
+            raise InputError(f"{self.id}: not six numbers in each direction") from None
         law = FormulaLaw(self.id, self.component, direction, self.expression, used, keys)
         estimates = {key: Estimate(self.start.get(key, 1.0)) for key in keys}
         return Effect(law, self.component, estimates)
@@ -112,8 +115,8 @@ def _direction_of(text: str) -> list[float]:
         return [*three, 0.0, 0.0, 0.0] if kind == "along" else [0.0, 0.0, 0.0, *three]
     if kind in KINDS or len(three) != 6:
         raise InputError(
-            f"--direction {text}: write six numbers (translation, rotation), or as compare says "
-            "'along +z', 'about (-0.38, -0.88, 0.29)'"
+            f"--direction {text.strip() or '(nothing)'}: write six numbers (translation, rotation),"
+            " or as compare says 'along +z', 'about (-0.38, -0.88, 0.29)'; several between ';'"
         )
     return three
 

@@ -39,7 +39,8 @@ SHARPNESS, BEATS = (4.0, 15.0), tuple(1.0 + n / 6.0 for n in range(37))
 """How sharp a pulse may be, 0.16 and 0.08 of a period long, and how often what is sharp may repeat
 in a recording: in steps that move its last one hardly farther than its length."""
 
-TURN = "6.2832"
+WHOLE_TURN = "6.2832"
+"""2 pi, as a formula has it."""
 
 RESTS = (0.01, 0.05, 0.2)
 """Speeds below which a motor may rest, in half ranges of the speed."""
@@ -50,7 +51,8 @@ LATE = 6
 EVERYWHERE = "poses all over the workspace"
 
 LINEAR = ("a share", "a late follower", "a passing answer")
-"""Sorts of law that answer to a vector whatever the axes that it is written in."""
+"""Sorts of law that answer to a vector whatever the axes that it is written in; so does a product
+with another signal."""
 
 VECTORS = (
     ("theta_dot_1", "theta_dot_2"),
@@ -105,8 +107,8 @@ class Form:
     usual : float
         Value of the formula at which the law has its usual size.
     parts : tuple of Form
-        Of a vector the form of each of its signals, which act along directions of their own; these
-        tell how it is written.
+        Of a vector the form of each of its signals, which act along directions of their own; what
+        is written, told and needed is theirs.
     """
 
     kind: str
@@ -214,8 +216,7 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
             names = dict.fromkeys(name for each in parts for name in each.of)
             common = set.intersection(*(set(each.of) for each in parts))
             of = tuple(sorted(names, key=common.__contains__))
-            needs = "; ".join(each.needs for each in parts)
-            found.append(replace(parts[0], of=of, needs=needs, parts=parts))
+            found.append(replace(parts[0], of=of, parts=parts))
     return found
 
 
@@ -281,13 +282,13 @@ def _rest(of: tuple[str, ...], half: float) -> Form:
     """Return what is there at rest alone: of a brake, of a controller, of air that stands."""
     slow = Span(tuple(half * each for each in RESTS), positive=True)
     squares = " + ".join(f"{name} ** 2" for name in of)
-    who = " and ".join(f"motor {name[-1]}" for name in of)
+    who = "both motors" if len(of) > 1 else f"motor {of[0][-1]}"
     return Form(
         "a rest",
         of,
         (slow,),
         lambda s: f"exp(-({squares}) / {number(s[0] ** 2)})",
-        lambda s: f"while {who} rests, below {number(s[0])} rad/s",
+        lambda s: f"below {number(s[0])} rad/s of {who}",
         f"moves and rests of {who} in turn, at the same poses",
     )
 
@@ -439,7 +440,7 @@ def _of_time(time: Array, length: float) -> list[Form]:
              lambda s: f"as a pulse of {number(2.0 / s[0] / np.sqrt(s[2]))} s every "
              f"{number(2.0 * np.pi / s[0])} s", again),
         Form("a saw-tooth", of, (beats, turns),
-             lambda s: f"({turn(s)} / {TURN} - floor({turn(s)} / {TURN}))",
+             lambda s: f"({turn(s)} / {WHOLE_TURN} - floor({turn(s)} / {WHOLE_TURN}))",
              lambda s: f"as a ramp that begins anew every {number(2.0 * np.pi / s[0])} s", again),
     ]  # fmt: skip
 

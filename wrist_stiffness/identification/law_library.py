@@ -26,6 +26,7 @@ from wrist_stiffness.model.formula_law import (
     TOOL,
     TURNS,
     WRENCH,
+    WRENCH_PLACES,
 )
 from wrist_stiffness.model.places import BODY, LIMB
 from wrist_stiffness.model.situation import Situation
@@ -64,7 +65,7 @@ STEPS = 40
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """A form of r numbers at a component in k directions, at its best shape so far."""
+    """A form of r signals at a component, its screws free in k coordinates, at its best shape."""
 
     form: Form
     place: int
@@ -76,7 +77,7 @@ class Asked:
 
 def key_of(place: str, axis: int) -> str:
     """Return the parameter of a law's size along an axis of a screw, or of a wrench."""
-    if place in (LOAD_SENSOR, TOOL):
+    if place in WRENCH_PLACES:
         return "size_N" if axis < 3 else "size_Nmm"
     return "size_um" if axis < 3 else "size_mdeg"
 
@@ -106,7 +107,7 @@ class Library:
                 kept = [(form, shape, rows) for shape, rows in asked if rows is not None]
                 points.setdefault(len(form.each), []).extend(kept)
                 kinds += bool(kept)
-            self._points.append(list(points.values()))
+            self._points.append([own for own in points.values() if own])
         self.price = float(np.log(OUTSIDE / max(kinds, 1)))
         self.count = sum(len(own) for place in self._points for own in place) * len(DIRECTIONS)
 
@@ -136,8 +137,11 @@ class Library:
         """Return the laws that are worth more than their first order."""
         best: dict[tuple[str, int, int], Asked] = {}
         for place, every in enumerate(self._points):
-            for points, (number, free) in product(every, enumerate(DIRECTIONS)):
-                gains, z = beyond.gains(np.array([rows for _, _, rows in points]), place, free)
+            units = [np.array([rows for _, _, rows in points]) for points in every]
+            for (points, rows), (number, free) in product(
+                zip(every, units, strict=True), enumerate(DIRECTIONS)
+            ):
+                gains, z = beyond.gains(rows, place, free)
                 first = 0
                 for form, run in groupby(form for form, _, _ in points):
                     own = slice(first, first := first + sum(1 for _ in run))
@@ -288,7 +292,7 @@ def _signals_at(fit: WristFit, number: int) -> dict[str, dict[str, Array]]:
     """Return what a formula at each place may use, at the kept moments of a session, (k,) each.
 
     The load that goes through a place in its own frame, of a passive joint its turn; at the load
-    sensor the load on the platform.
+    sensor the load on the platform, and at the tool that in the platform's own frame.
     """
     own = fit.base.model(number)
     block, model = own.session.block, own.model.with_effects(*own.effects)

@@ -101,7 +101,7 @@ class Proposal:
     def way(self) -> str:
         """Direction as `extend --direction` takes it: `along +z`, or six numbers; or several."""
         if len(self.direction) > 1 or (self.direction[:, :3].any() and self.direction[:, 3:].any()):
-            return words_of(self.direction)
+            return words_of(self.direction, digits=4)
         return _words(self.direction[0], self.key)
 
     @property
@@ -112,13 +112,12 @@ class Proposal:
     @property
     def sentence(self) -> str:
         """What it says of the wrist."""
-        told = [
-            (self._screw(row), form.tell(self.shape))
-            for row, form in zip(self.direction, self.form.each, strict=True)
-        ]
-        if len(told) == 1:
-            return f" at {self.places} ".join(told[0])
-        return f"at {self.places}: " + "; ".join(" ".join(each) for each in told)
+        screws = [self._screw(row) for row in self.direction]
+        laws = [form.tell(self.shape) for form in self.form.each]
+        if len(screws) == 1:
+            return f"{screws[0]} at {self.places} {laws[0]}"
+        told = (f"{screw} {law}" for screw, law in zip(screws, laws, strict=True))
+        return f"at {self.places}: {'; '.join(told)}"
 
     def _screw(self, row: Array) -> str:
         """Return how large it is along one direction, in words."""
@@ -208,7 +207,7 @@ class Proposals:
             return ""
         one, two = self.terms[0].form, self.rivals[0].form
         if one.name != two.name:
-            needs = list(dict.fromkeys((one.needs, two.needs)))
+            needs = dict.fromkeys(each.needs for form in (one, two) for each in form.each)
             return f"record {'; and '.join(needs)}"
         return f"record {one.needs}, each at {EVERYWHERE}"
 

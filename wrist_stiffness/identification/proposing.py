@@ -38,9 +38,6 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import si_factor
 
-MOST_FITTED = 6
-"""Leading laws that are fitted."""
-
 UNLIKE = 2.0
 """Times by which a fit may reach further beyond its first order than another one (assumed)."""
 
@@ -221,7 +218,7 @@ class _Search:
     def _settled(self, found: list[_Judged], near: WristFit) -> list[_Judged]:
         """Return laws, the most probable first, fitted where that may change which it is."""
         best, reach = near.evidence.log, 0.0
-        for number, first in enumerate(found[:MOST_FITTED]):
+        for number, first in enumerate(found):
             # Fits reach further than their first order, some more than others.
             if first.log + UNLIKE * reach < best - NEGLIGIBLE:
                 break

@@ -82,8 +82,8 @@ class Past:
     """What a formula remembers while it is evaluated."""
 
     time: Array  # (n,), stamps [s]
-    # of each remembering function by its column in the formula; empty before the first sample
-    states: dict[int, State] = field(default_factory=dict)
+    # of each remembering function by its line and column; empty before the first sample
+    states: dict[tuple[int, int], State] = field(default_factory=dict)
 
     def follow(self, node: ast.Call, name: str, values: Sequence[Value]) -> Value:
         """Return what a remembering function makes of its arguments."""
@@ -91,7 +91,7 @@ class Past:
         size = np.asarray(values[1], dtype=float)
         if size.ndim or not size > 0.0 or not np.isfinite(x).all():
             return np.full(x.shape, np.nan)
-        at = node.col_offset
+        at = node.lineno, node.col_offset
         found, self.states[at] = MEMORIES[name](x, float(size), self.time, self.states.get(at))
         return found
 
@@ -194,6 +194,8 @@ class Formula:
                 and not (isinstance(node, ast.Name) and node.id in COUNTS)
                 and not np.all(np.isfinite(_value(node, values, Past(np.zeros(1)))))
             ]
+        if not terms:
+            return f"{self.text} has no finite value after what was before"
         # A walk goes from the whole to its parts.
         term = terms[-1]
         used = sorted({node.id for node in ast.walk(term) if isinstance(node, ast.Name)})
@@ -248,8 +250,8 @@ class Formula:
         else:
             raise self._refusal(
                 node,
-                "only numbers, names, + - * / **, parentheses and the functions "
-                f"{', '.join(COUNTS)} are allowed",
+                "only numbers, names, + - * / **, parentheses, the functions "
+                f"{', '.join(COUNTS)} and commas between whole formulas are allowed",
             )
 
     def _refusal(self, node: ast.expr, why: str) -> InputError:

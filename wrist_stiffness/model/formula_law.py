@@ -37,14 +37,16 @@ LOAD_SENSOR, TOOL = "load_sensor", "tool"
 """Components at which a formula is no screw but a wrench on the platform that the load sensor does
 not say: fixed in the cell, and turning with the platform."""
 
-FORMULA_PLACES = (*LIMB, LOAD_SENSOR, TOOL)
+WRENCH_PLACES = (LOAD_SENSOR, TOOL)
+
+FORMULA_PLACES = (*LIMB, *WRENCH_PLACES)
 """Components of a formula."""
 
 
-def words_of(direction: ArrayLike) -> str:
+def words_of(direction: ArrayLike, digits: int = 12) -> str:
     """Return a direction, or several, as `extend --direction` takes them."""
     rows = np.atleast_2d(direction)
-    return "; ".join(" ".join(f"{number:.4g}" for number in row) for row in rows)
+    return "; ".join(" ".join(f"{number:.{digits}g}" for number in row) for row in rows)
 
 
 class FormulaLaw(Law):
@@ -58,11 +60,13 @@ class FormulaLaw(Law):
     the expression has between commas; their screws add up.  `expression`: in `theta_1`,
     `theta_2` [rad], `theta_dot_1`, `theta_dot_2` [rad/s], `turn_2` ... `turn_4` (turns of the
     passive joints from home [rad]), `fx` ... `mz` (wrench through the component at O in its home
-    frame [N, N m]), `W_fx` ... `W_mz` (wrench on the platform at O in F), `T_<component>` [degC],
+    frame [N, N m]; at the load sensor that on the platform in F, at the tool in U), `W_fx` ...
+    `W_mz` (wrench on the platform at O in F), `T_<component>` [degC],
     `time` [s], the covariates and the parameters.  `covariates`: those that it may use.  `keys`:
     parameters; one whose name ends in a known unit is converted to SI units.  Raises `InputError`
     if the id cannot be one, the component carries no screw, the direction is not six finite numbers
-    or zero, a name is no name or used twice, or the expression is not allowed.
+    or zero, a name is no name or used twice, the expression is not allowed, or has not as many
+    formulas as there are directions.
     """
 
     check = "what the formula's author has in mind"
@@ -82,12 +86,13 @@ class FormulaLaw(Law):
             known = ", ".join(FORMULA_PLACES)
             raise InputError(f"{name}: component {place!r} is not one of {known}")
         rows = np.atleast_2d(direction)
-        if rows.shape[1:] != (6,) or not np.isfinite(rows).all() or not rows.any(axis=1).all():
-            raise InputError(
-                f"{name}: direction {direction.tolist()} is not six finite numbers, one not zero"
-            )
+        for row in rows:
+            if row.shape != (6,) or not np.isfinite(row).all() or not row.any():
+                raise InputError(
+                    f"{name}: direction {row.tolist()} is not six finite numbers, one not zero"
+                )
         self.id = name
-        self.stage = "load" if place in (LOAD_SENSOR, TOOL) else "reaction"
+        self.stage = "load" if place in WRENCH_PLACES else "reaction"
         self.places = (place,)
         self.sentence = f"{{place}}: {expression}"
         self.direction = rows
@@ -104,7 +109,8 @@ class FormulaLaw(Law):
         self.formula = Formula(expression, (*sorted(SIGNALS), *self.covariates, *keys))
         if self.formula.count != len(rows):
             raise InputError(
-                f"{name}: {self.formula.count} formulas {expression!r}, but {len(rows)} directions"
+                f"{name}: {expression!r} has commas for {self.formula.count} formulas, but there "
+                f"are directions for {len(rows)}"
             )
         self.signals = tuple(
             used
