@@ -133,6 +133,8 @@ def test_what_answers_to_both_speeds_is_one_law_that_can_be_added(model, day, tm
     assert law.value * law.direction[:, 3:] == pytest.approx(40.0 * np.array(ways)[:, 3:], abs=6.0)
     assert law.sentence.startswith("at tool or whatever pulls and turns with the platform: ")
     assert "rad/s of theta_dot_1; " in law.sentence
+    again = found.lines("there/proposed_1.yaml", ["day"])
+    assert "--name proposed_2 --fit day -o proposed_2.yaml" in again[2]
     words = law.command("m.yaml", ["day"])
     assert "'size_Nmm * theta_dot_1, size_Nmm * theta_dot_2'" in words
     assert direction_of(law.way.split()) == pytest.approx(law.direction, abs=1e-3)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -228,13 +230,16 @@ class Proposals:
         named : sequence of str
             Effects, `name@component`, beside which they were found: these are added first.
         """
+        # A model that has such a law already is not overwritten.
+        before = re.fullmatch(r"proposed_(\d+)", Path(model).stem)
+        first = int(before[1]) + 1 if before else 1
         out = []
-        for number, each in enumerate(self.terms, 1):
+        for number, each in enumerate(self.terms, first):
             name = f"proposed_{number}"
-            out.append(f"{'Proposed law' if number == 1 else 'And'}: {each.sentence}.")
-            of = "the error above the noise" if number == 1 else "what the first leaves above it"
+            out.append(f"{'Proposed law' if number == first else 'And'}: {each.sentence}.")
+            of = "what the first leaves above it" if number > first else "the error above the noise"
             out.append(f"   explains {100.0 * each.explains:.0f} % of {of}")
-            for place, effect in enumerate(named if number == 1 else (), 1):
+            for place, effect in enumerate(named if number == first else (), 1):
                 target = f"found_{place}.yaml"
                 words = ["extend", model, "--effect", effect, "--fit", *recordings, "-o", target]
                 out.append(f"   {shlex.join(['wrist-stiffness', *words])}")
