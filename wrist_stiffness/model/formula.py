@@ -216,7 +216,7 @@ class Formula:
     def _check(self, node: ast.expr, depth: int) -> None:
         if depth > DEEPEST:
             raise self._refusal(node, f"nested deeper than {DEEPEST} levels")
-        if depth == 0 and isinstance(node, ast.Tuple) and node.elts:
+        if depth == 0 and isinstance(node, ast.Tuple) and len(node.elts) > 1:
             for each in node.elts:
                 self._check(each, 1)
             return
