@@ -16,8 +16,7 @@ from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.comparing.explained import explain
 from wrist_stiffness.inference import Diagnosis, Finding, Observations
 from wrist_stiffness.inference.answer import NotExcited, Standing
-from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
-from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
+from wrist_stiffness.report.diagnosis_report import diagnosis_lines, report_of_diagnosis
 from wrist_stiffness.report.page import html_of
 from wrist_stiffness.sessions.unit_session import QUANTITIES
 from wrist_stiffness.shipped import shipped_file

@@ -8,7 +8,7 @@ from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.inference.answer import Standing
-from wrist_stiffness.report.diagnosis_lines import (
+from wrist_stiffness.report.diagnosis_report import (
     absorbed_lines,
     class_of,
     correction_of,

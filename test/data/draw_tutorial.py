@@ -21,9 +21,8 @@ from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.formula_law import TURNS
-from wrist_stiffness.report.parts import unit_of
-from wrist_stiffness.report.pictures.dependence import draw_against
-from wrist_stiffness.report.pictures.errors import Bars, draw_bars
+from wrist_stiffness.report.page import typeset
+from wrist_stiffness.report.pictures.errors import Bars, draw_against, draw_bars
 from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure
 from wrist_stiffness.shipped import shipped_file
 
@@ -49,7 +48,7 @@ def draw(name: str, folder: Path) -> None:
     found = compared.comparison
     bars = [
         Bars(
-            f"{q.name} [{unit_of(q.unit)}]",
+            f"{q.name} [{typeset(q.unit)}]",
             models,
             [model.after[q.key].rms for model in found.models],
             [model.after[q.key].uncertainty for model in found.models],

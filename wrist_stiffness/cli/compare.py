@@ -44,12 +44,11 @@ def _run(arguments: argparse.Namespace) -> int:
         one = partial(compare, models, run=this_run())
         rows = each_recording(one, recordings, Progress("recordings"))
         return say(arguments, compared_lines(rows), table_values(rows, "comparison"))
-    from wrist_stiffness.report.comparison_lines import comparison_lines
+    from wrist_stiffness.report.comparison_report import comparison_lines, report_of_comparison
 
     found = compare(models, recordings, this_run(), Progress)
     code = say(arguments, comparison_lines(found), found.as_values())
     if arguments.report:
-        from wrist_stiffness.report.comparison_report import report_of_comparison
         from wrist_stiffness.report.page import write_page
 
         write_page(arguments.report, report_of_comparison(found))

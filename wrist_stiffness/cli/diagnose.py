@@ -64,7 +64,7 @@ def _run(arguments: argparse.Namespace) -> int:
         one = partial(diagnose_recordings, model, run=this_run(), naming=naming, seconds=seconds)
         rows = each_recording(one, recordings, Progress("recordings"))
         return say(arguments, diagnosed_lines(rows), table_values(rows, "diagnosis"))
-    from wrist_stiffness.report.diagnosis_lines import diagnosis_lines
+    from wrist_stiffness.report.diagnosis_report import diagnosis_lines, report_of_diagnosis
 
     with Status() as status:
         found = diagnose_recordings(
@@ -72,7 +72,6 @@ def _run(arguments: argparse.Namespace) -> int:
         )
     code = say(arguments, diagnosis_lines(found), found.as_values(arguments.ranking))
     if arguments.report:
-        from wrist_stiffness.report.diagnosis_report import report_of_diagnosis
         from wrist_stiffness.report.page import write_page
 
         write_page(arguments.report, report_of_diagnosis(found))

@@ -42,7 +42,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     from wrist_stiffness.commands.explain import explain
     from wrist_stiffness.model.block import Load
-    from wrist_stiffness.report.pose_lines import explanation_lines
+    from wrist_stiffness.report.terminal import explanation_lines
 
     load = np.array(whole_load(arguments.load))
     measured = arguments.measured

@@ -28,7 +28,7 @@ def _run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from wrist_stiffness.commands.predict import predict
-    from wrist_stiffness.report.pose_lines import prediction_lines
+    from wrist_stiffness.report.terminal import prediction_lines
 
     load, theta = whole_load(arguments.load), np.radians(arguments.angles).tolist()
     found = predict(model_named(arguments), theta, load, arguments.on_platform, arguments.both)

@@ -45,7 +45,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands.output_changes import TopicChanges, output_changes
     from wrist_stiffness.commands.replay import replay
     from wrist_stiffness.recording.reader import open_recording
-    from wrist_stiffness.report.replay_lines import change_line, replay_lines
+    from wrist_stiffness.report.terminal import change_line, replay_lines
     from wrist_stiffness.topics import parse_topic_remaps
 
     settings = settings_named(arguments)

@@ -133,7 +133,7 @@ def add_parser(commands: Commands) -> None:
 def _build(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.cli.progress import Progress
     from wrist_stiffness.commands import table
-    from wrist_stiffness.report.table_lines import fact_lines
+    from wrist_stiffness.report.terminal import fact_lines
 
     built = table.build(
         arguments.geometry or SHIPPED,
@@ -192,7 +192,7 @@ def _show(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands import modes, table
     from wrist_stiffness.commands.budget import Push
     from wrist_stiffness.report.pictures.table import draw_maps, draw_modes
-    from wrist_stiffness.report.table_lines import fact_lines, load_lines, mode_lines
+    from wrist_stiffness.report.terminal import fact_lines, load_lines, mode_lines
 
     shown = table_named(arguments)
     values: Any

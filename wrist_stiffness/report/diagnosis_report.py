@@ -1,4 +1,4 @@
-"""The report of `diagnose`."""
+"""What `diagnose` tells, on a terminal and as a page; the verdict is that of the workbench too."""
 
 from __future__ import annotations
 
@@ -7,18 +7,24 @@ from typing import TYPE_CHECKING
 
 from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent, sentences
-from wrist_stiffness.inference import Diagnosis, Finding, Quantity
-from wrist_stiffness.report.diagnosis_lines import (
-    class_of,
-    correction_of,
-    needs_of,
-    rest_lines,
-    verdict_lines,
+from wrist_stiffness.identification.taken_up import TakenUp
+from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.report.page import (
+    TITLES,
+    Bullets,
+    Page,
+    Part,
+    Picture,
+    Sections,
+    Table,
+    drawn,
+    lines_of,
+    number,
+    plus_minus,
+    provenance_section,
 )
-from wrist_stiffness.report.page import Bullets, Page, Part, Section, Table, Text, drawn
-from wrist_stiffness.report.parts import number, plus_minus, provenance_section, typeset, unit_of
-from wrist_stiffness.report.pictures.dependence import draw_against
-from wrist_stiffness.report.pictures.errors import Bars, draw_bars
+from wrist_stiffness.report.pictures.errors import Bars, draw_against, draw_bars
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.diagnose import Diagnosed
@@ -28,6 +34,11 @@ MOST_PICTURED = 4
 
 MOST_RANKED = 12
 """Candidates that are told."""
+
+USUAL = 1.0
+"""Standard deviations of its prior within which a tolerance needs no line of its own."""
+
+MOST_PROMISING = 3
 
 
 HOW = (
@@ -43,136 +54,209 @@ HOW = (
 )
 
 
+def diagnosis_lines(found: Diagnosed) -> list[str]:
+    """Return the answer for a terminal, the verdict first."""
+    result = found.result
+    sections: Sections = {
+        **_sections(result),
+        "Absorbed by calibration, largest first": [Bullets(absorbed_lines(found.answer.absorbed))],
+        "To be kept in mind": [Bullets(found.remarks)] if found.remarks else [],
+    }
+    mistake = [found.mistake, ""] if found.mistake else []
+    return [*mistake, *verdict_lines(result), *found.proposed(), *lines_of(sections)]
+
+
 def report_of_diagnosis(found: Diagnosed) -> Page:
     """Return the report of a diagnosis."""
     result, left = found.result, found.depends()
-    quantities, units = left.observations.reported, left.observations.n_units
-    sections = [
-        Section("Findings", tuple(_findings(result, quantities))),
-        Section("How much it brings", _fall(result, quantities)),
-        Section("Every candidate", _ranking(result)),
-        Section("Where it shows", _depends(found, left)),
-        Section("What remains", _remains(result, found.proposed())),
-        Section("What these recordings cannot show", _not_excited(result)),
-        Section("Absorbed by calibration", _absorbed(result, found.remarks)),
-        Section("How it was computed", (Bullets(HOW),)),
-        provenance_section(found.provenance),
-    ]
+    verdict = [*([found.mistake] if found.mistake else []), *verdict_lines(result)]
+    if result.findings:
+        falls = [
+            f"{_name(key)} from {number(before)} to {number(result.after[key])} {_unit(key)} "
+            f"(instrument noise {number(result.noise[key])})"
+            for key, before in result.before.items()
+        ]
+        verdict.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
+    sections = _sections(result)
+    sections["How much it brings"].append(_fall(result))
+    remains = [*(rest_lines(result) or ["Nothing beyond the noise."]), *found.proposed()]
+    absorbed: list[Part] = [Bullets(result.absorbed)]
+    if found.remarks:
+        absorbed += ["To be kept in mind:", Bullets(found.remarks)]
     return Page(
         "Which physical effect is missing?",
-        f"{', '.join(found.recordings)}: {units} dwells and half seconds in motion",
-        (*([found.mistake] if found.mistake else []), *_verdict(result, quantities)),
-        tuple(sections),
+        f"{', '.join(found.recordings)}: {left.observations.n_units} dwells and half seconds in "
+        "motion",
+        verdict,
+        {
+            **sections,
+            "Where it shows": _depends(found, left),
+            "What remains": remains,
+            "Absorbed by calibration": absorbed,
+            "How it was computed": [Bullets(HOW)],
+            **provenance_section(found.provenance),
+        },
     )
 
 
-def _verdict(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
-    """Return the answer in a few sentences."""
-    lines = verdict_lines(result)
-    if result.findings:
-        falls = [
-            f"{q.name} from {number(result.before[q.key])} to {number(result.after[q.key])} "
-            f"{unit_of(q.unit)} (instrument noise {number(result.noise[q.key])})"
-            for q in quantities
-        ]
-        lines.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
-    return tuple(typeset(line) for line in lines)
-
-
-def _findings(result: Diagnosis, quantities: tuple[Quantity, ...]) -> list[Part]:
-    if not result.findings:
-        return [Text("No effect of the catalogue was found.")]
-    parts: list[Part] = []
+def _sections(result: Diagnosis) -> dict[str, list[Part]]:
+    """Return what both tell."""
+    findings: list[Part] = []
     for place, finding in enumerate(result.findings, 1):
-        parts.append(Text(f"{place}. {class_of(finding)}. {typeset(finding.evidence)}"))
-        if finding.check:
-            parts.append(Text(f"To be sure: {finding.check}."))
-        parts.append(_numbers(finding, quantities))
-    return parts
+        findings.append(f"{place}. {class_of(finding)}. {finding.evidence}")
+        findings += [f"To be sure: {finding.check}."] if finding.check else []
+        findings.append(_numbers(finding))
+    rows = (
+        ("calibrated model", result.before),
+        ("with the findings", result.after),
+        ("instrument noise", result.noise),
+        ("left above the noise", result.discrepancy),
+    )
+    table = Table(
+        f"RMS; of the first two on the held-out part, which was {result.scope}.",
+        ["", *(TITLES[key] for key in result.before)],
+        [[name, *(number(row[key]) for key in result.before)] for name, row in rows],
+    )
+    needs: dict[str, list[str]] = {}
+    for each in result.not_excited:
+        needs.setdefault(each.needs, []).append(f"{each.effect}@{each.component}")
+    unseen = [f"{', '.join(names)}: {need}" for need, names in needs.items()]
+    return {
+        "Findings": findings or ["No effect of the catalogue was found."],
+        "How much it brings": [table],
+        "Every candidate": [_ranking(result)],
+        "What these recordings cannot show": [
+            Bullets(unseen) if unseen else "Every effect of the catalogue would have shown."
+        ],
+    }
 
 
-def _numbers(finding: Finding, quantities: tuple[Quantity, ...]) -> Table:
-    rows = [
-        (name, typeset(plus_minus(value, error)))
-        for name, (value, error) in finding.parameters.items()
+def _name(key: str) -> str:
+    return key.rpartition("_")[0]
+
+
+def _unit(key: str) -> str:
+    return key.rpartition("_")[2]
+
+
+def _numbers(finding: Finding) -> Table:
+    rows = [(name, plus_minus(*each)) for name, each in finding.parameters.items()]
+    rows += [
+        (f"held-out error of {_name(key)} falls by", f"{plus_minus(*gain)} {_unit(key)}")
+        for key, gain in finding.buys.items()
     ]
-    for q in quantities:
-        if q.key in finding.buys:
-            gain, error = finding.buys[q.key]
-            rows.append(
-                (
-                    f"held-out error of {q.name} falls by",
-                    typeset(f"{plus_minus(gain, error)} {unit_of(q.unit)}"),
-                )
-            )
     rows += [
         ("probability", percent(finding.probability)),
         ("log evidence against the model without it", f"{finding.log_gain:+.0f}"),
         ("correction", correction_of(finding)),
     ]
-    return Table(f"Numbers of {finding.name}.", ("", "value"), tuple(rows))
+    return Table(f"Numbers of {finding.name}.", ("", "value"), rows)
 
 
-def _fall(result: Diagnosis, quantities: tuple[Quantity, ...]) -> tuple[Part, ...]:
+def _fall(result: Diagnosis) -> Picture:
     bars = [
         Bars(
-            f"{q.name} [{unit_of(q.unit)}]",
+            TITLES[key],
             ["before", "with the findings"],
-            [result.before[q.key], result.after[q.key]],
+            [before, result.after[key]],
             [0.0, 0.0],
-            {"instrument noise": result.noise[q.key]},
+            {"instrument noise": result.noise[key]},
         )
-        for q in quantities
+        for key, before in result.before.items()
     ]
     caption = (
         f"Error on the held-out part ({result.scope}), before and with the findings in the model."
     )
-    return (drawn(draw_bars(bars), caption),)
+    return drawn(draw_bars(bars), caption)
 
 
-def _ranking(result: Diagnosis) -> tuple[Part, ...]:
+def _ranking(result: Diagnosis) -> Table:
     """Return how the leading candidates stand."""
-    rows = tuple(
+    rows = [
         (each.name, percent(each.probability), f"{each.log_gain:+.0f}", each.why_not or "named")
         for each in result.standings[:MOST_RANKED]
-    )
+    ]
     caption = "How the leading candidates stand; log evidence against the calibrated model."
-    return (Table(caption, ("effect", "probability", "log evidence", ""), rows),)
+    return Table(caption, ("effect", "probability", "log evidence", ""), rows)
 
 
-def _depends(found: Diagnosed, left: Explained) -> tuple[Part, ...]:
-    parts: list[Part] = [Bullets(tuple(typeset(line) for line in sentences(left)))]
+def _depends(found: Diagnosed, left: Explained) -> list[Part]:
+    told = Bullets(sentences(left))
     if not left.told:
-        return tuple(parts)
+        return [told]
     series = []
     if found.result.findings:
         after = left.observations.with_values(found.answer.fitted.residual)
         series.append(("with the findings", after))
-    parts.append(
-        drawn(
-            draw_against(left.told[:MOST_PICTURED], series),
-            "What the refitted base leaves against the conditions that show it best, everything "
-            "else that was found taken out: every dwell and half second in motion, and the fitted "
-            "law with its 95 % band.",
-        )
+    caption = (
+        "What the refitted base leaves against the conditions that show it best, everything else "
+        "that was found taken out: every dwell and half second in motion, and the fitted law with "
+        "its 95 % band."
     )
-    return tuple(parts)
+    return [told, drawn(draw_against(left.told[:MOST_PICTURED], series), caption)]
 
 
-def _remains(result: Diagnosis, proposed: Sequence[str]) -> tuple[Part, ...]:
-    lines = [*(rest_lines(result) or ["Nothing beyond the noise."]), *proposed]
-    return tuple(Text(typeset(line)) for line in lines)
+def verdict_lines(result: Diagnosis) -> list[str]:
+    """Return the verdict in one or two sentences."""
+    if result.verdict == "none":
+        return [f"Nothing is missing: what is left is noise ({percent(result.probability)} sure)."]
+    found = "; ".join(f"{class_of(e)}, {percent(e.probability)} sure" for e in result.findings)
+    lines = [f"Missing in the model: {found}."] if found else []
+    if not result.complete:
+        lines.append(_unfinished(result))
+    elif result.verdict == "unknown":
+        if result.depends_on:
+            lines.append("The error is real, but no effect in the catalogue explains it.")
+        else:
+            lines.append("An effect is missing, but these recordings do not say which.")
+    return [*lines, *rest_lines(result)]
 
 
-def _not_excited(result: Diagnosis) -> tuple[Part, ...]:
-    if not result.not_excited:
-        return (Text("Every effect of the catalogue would have shown."),)
-    rows = tuple((", ".join(names), need) for need, names in needs_of(result).items())
-    return (Table("To be recorded if one of these is suspected.", ("effects", "needs"), rows),)
+def _unfinished(result: Diagnosis) -> str:
+    text = "The time was over before every candidate was fitted"
+    if result.promising:
+        text += f"; most promising: {', '.join(e.name for e in result.promising[:MOST_PROMISING])}"
+    return f"{text}. Allow more --seconds."
 
 
-def _absorbed(result: Diagnosis, notes: Sequence[str]) -> tuple[Part, ...]:
-    parts: list[Part] = [Bullets(tuple(typeset(line) for line in result.absorbed))]
-    if notes:
-        parts += [Text("To be kept in mind:"), Bullets(tuple(notes))]
-    return tuple(parts)
+def rest_lines(result: Diagnosis) -> list[str]:
+    """Return how much is left, and on what it depends; nothing where it is noise."""
+    if not result.depends_on:
+        return []
+    left = ", ".join(
+        f"{key.rpartition('_')[0]} {size:.2g} {key.rpartition('_')[2]}"
+        for key, size in result.discrepancy.items()
+    )
+    causes = ", ".join(f"{name} ({percent(part)})" for name, part in result.depends_on.items())
+    return [f"Left above the noise: {left}. It depends on {causes}."]
+
+
+def class_of(finding: Finding) -> str:
+    """Return the best effect of a class, and those that the data cannot tell from it."""
+    first, *others = finding.members
+    if not others:
+        return finding.name
+    told = ", ".join(f"{effect}@{place} {percent(share)}" for effect, place, share in others)
+    return f"{finding.name} ({percent(first[2])}; or {told})"
+
+
+def correction_of(finding: Finding) -> str:
+    """Return what the nodes can do about a finding."""
+    if finding.compensable == "yes":
+        return "the nodes can correct it"
+    if finding.compensable == "needs_signal":
+        return "the nodes can correct it where they get its signal"
+    law, place, _ = finding.members[0]
+    if find_law(law).of_measurement(place):
+        return "it is in the instrument, so nothing is to be corrected"
+    return "it shifts the platform and does not turn it, so only the manipulator can correct it"
+
+
+def absorbed_lines(absorbed: Sequence[TakenUp]) -> list[str]:
+    """Return set-up and what left its usual range a line each, all the rest in one."""
+    within = [each for each in absorbed if each.parameter and each.deviations <= USUAL]
+    out = [each.sentence for each in absorbed if each not in within]
+    if within:
+        names = ", ".join(each.name for each in within)
+        out.append(f"within {USUAL:g} standard deviation of their tolerances: {names}")
+    return out

@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
 from wrist_stiffness.identification.result import Fit, FittedParameter
-from wrist_stiffness.report.parts import TITLES, plus_minus
+from wrist_stiffness.report.page import TITLES, Table, plus_minus
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 if TYPE_CHECKING:
@@ -37,19 +37,17 @@ def calibration_lines(found: Calibrated) -> list[str]:
     rows = {"model as it stands": result.before, "calibrated": result.after}
     lines = _judged_lines(found.sessions, result.fit, result.judged_by, rows)
     lines += [found.mistake] if found.mistake else []
-    for session in found.sessions:
-        own = told_lines(each for each in parameters if each.session == session.name)
-        lines += ["", f"set up in {session.name}:", *(own or ["  nothing identifiable"])]
-    wrist = told_lines(each for each in parameters if each.session is None)
-    lines += ["", "of this wrist:", *(wrist or ["  nothing identifiable"])]
-    for title, part in (
-        (
-            "farther off than typical, to be checked on the machine:",
-            far_lines(result.fit, parameters),
-        ),
-        ("not identifiable from these recordings:", untold_lines(result.fit, parameters)),
-    ):
-        lines += ["", title, *part] if part else []
+    parts = {
+        f"set up in {session.name}:": told_lines(p for p in parameters if p.session == session.name)
+        for session in found.sessions
+    }
+    parts["of this wrist:"] = told_lines(each for each in parameters if each.session is None)
+    for title, part in parts.items():
+        lines += ["", title, *(part or ["  nothing identifiable"])]
+    if far := far_lines(result.fit, parameters):
+        lines += ["", "farther off than typical, to be checked on the machine:", *far]
+    if untold := untold_lines(result.fit, parameters):
+        lines += ["", "not identifiable from these recordings:", *untold]
     if result.calibrated:
         lines += ["", f"not fitted, calibrated as the notes say: {', '.join(result.calibrated)}"]
     return lines
@@ -83,17 +81,12 @@ def _judged_lines(
     rows: Mapping[str, Mapping[str, float]],
 ) -> list[str]:
     """Tell what a fit saw, its errors as a table, and how they were judged."""
-    table = {**rows, "noise and drift alone": fit.noise}
-    return [
-        *used_lines(sessions, fit),
-        "",
-        " " * 28 + "".join(f"{TITLES.get(key, key):>12}" for key in fit.noise),
-        *(
-            f"{name:28}" + "".join(f"{row[key]:12.3f}" for key in fit.noise)
-            for name, row in table.items()
-        ),
-        *left_lines(fit, judged_by),
+    cells = [
+        [name, *(f"{row[key]:.3f}" for key in fit.noise)]
+        for name, row in {**rows, "noise and drift alone": fit.noise}.items()
     ]
+    table = Table("", ["", *(TITLES.get(key, key) for key in fit.noise)], cells)
+    return [*used_lines(sessions, fit), "", *table.lines(), *left_lines(fit, judged_by)]
 
 
 def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:

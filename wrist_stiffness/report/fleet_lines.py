@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wrist_stiffness.comparing.wiring import LOOK_FIRST
-from wrist_stiffness.report.parts import TITLES
+from wrist_stiffness.report.page import TITLES, Table
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.fleet import Row
@@ -14,82 +14,68 @@ if TYPE_CHECKING:
 Values = dict[str, Any]
 Rows: TypeAlias = "Sequence[Row]"
 
-
 POSE = ("s_um", "phi_mdeg")
-"""Quantities of poses, which have columns."""
+"""Quantities of poses, which have columns; a recording may lack one."""
 
 
 def compared_lines(rows: Rows) -> list[str]:
     """Return the last model against each recording, from what `compare` gives for a program."""
+
+    def cells(values: Values) -> list[str]:
+        model, noise = values["models"][-1], values["instrument_noise"]
+        found = []
+        for key in POSE:
+            size = model["after_registration"].get(key)
+            found += ["-", "-"] if size is None else [f"{size['rms']:.3g}", f"{noise[key]:.3g}"]
+        depends = model["depends_on"]
+        return [*found, depends[0]["condition"] if depends else "nothing beyond chance"]
+
+    def mistakes(values: Values) -> list[str]:
+        return [sentence for sentence in values["verdict"] if sentence.startswith(LOOK_FIRST)]
+
     models = {row.result["models"][-1]["model"] for row in rows if row.result is not None}
-    titles = f"{'s [um]':>10}{'noise':>8}{'phi [mdeg]':>12}{'noise':>8}  strongest dependence"
-    return [
-        *(f"{name}, RMS with registrations, zeros, tare refitted" for name in models),
-        *_table(rows, titles, _comparison, "compared", _wired_wrong),
-    ]
+    table = _table(rows, "strongest dependence", cells, "compared", mistakes)
+    return [*(f"{name}, RMS with registrations, zeros, tare refitted" for name in models), *table]
 
 
 def diagnosed_lines(rows: Rows) -> list[str]:
     """Return what is missing in each recording, from what `diagnose` gives for a program."""
-    titles = "".join(f"{TITLES[key]:>22}{'noise':>8}" for key in POSE) + "  missing"
-    return [
-        "held-out RMS, before and after what is missing is added, and instrument noise",
-        *_table(
-            rows,
-            titles,
-            _diagnosis,
-            "diagnosed",
-            lambda values: [each for each in [values["set_up_mistake"]] if each],
-        ),
-    ]
+
+    def cells(values: Values) -> list[str]:
+        found = []
+        for key in POSE:
+            before, after = (values[when].get(f"rms_{key}") for when in ("before", "after"))
+            fall = "-" if before is None else f"{before:.3g} -> {after:.3g}"
+            found += [fall, "-" if before is None else f"{values['noise'][key]:.3g}"]
+        return [*found, _missing(values)]
+
+    def mistakes(values: Values) -> list[str]:
+        return [each for each in [values["set_up_mistake"]] if each]
+
+    title = "held-out RMS, before and after what is missing is added, and instrument noise"
+    return [title, *_table(rows, "missing", cells, "diagnosed", mistakes)]
 
 
 def _table(
     rows: Rows,
-    titles: str,
-    cells: Callable[[Values], str],
-    undone: str,
-    mistakes: Callable[[Values], Sequence[str]],
+    last: str,
+    cells: Callable[[Values], list[str]],
+    done: str,
+    mistakes: Callable[[Values], list[str]],
 ) -> list[str]:
     """Return a line for each recording, and below the mistakes of the set-up."""
-    wide = max([len("recording"), *(len(str(row.item)) for row in rows)])
-    out, below = [f"{'recording':{wide}}{titles}"], []
+    lines, below = [], []
     for row in rows:
         if row.result is None:
             # The path stands before it already.
             why = row.error.removeprefix(f"{row.item}: ").removeprefix(f"{row.item} ")
-            out.append(f"{row.item!s:{wide}}  not {undone}: {why}")
-            continue
-        out.append(f"{row.item!s:{wide}}{cells(row.result)}")
-        below += [f"{row.item}: {sentence}" for sentence in mistakes(row.result)]
-    return [*out, *(["", *below] if below else [])]
-
-
-def _wired_wrong(values: Values) -> list[str]:
-    return [sentence for sentence in values["verdict"] if sentence.startswith(LOOK_FIRST)]
-
-
-def _comparison(values: Values) -> str:
-    model = values["models"][-1]
-    out = ""
-    for key, width in (("s_um", 10), ("phi_mdeg", 12)):
-        size = model["after_registration"].get(key)
-        # A recording may lack a quantity.
-        rms = "-" if size is None else f"{size['rms']:.3g}"
-        noise = "-" if size is None else f"{values['instrument_noise'][key]:.3g}"
-        out += f"{rms:>{width}}{noise:>8}"
-    depends = model["depends_on"]
-    return f"{out}  {depends[0]['condition'] if depends else 'nothing beyond chance'}"
-
-
-def _diagnosis(values: Values) -> str:
-    out = ""
-    for key in POSE:
-        before, after = (values[when].get(f"rms_{key}") for when in ("before", "after"))
-        noise = values["noise"].get(key)
-        fall = "-" if before is None else f"{before:.3g} -> {after:.3g}"
-        out += f"{fall:>22}{'-' if noise is None else f'{noise:.3g}':>8}"
-    return f"{out}  {_missing(values)}"
+            lines.append([str(row.item), "", "", "", "", f"not {done}: {why}"])
+        else:
+            lines.append([str(row.item), *cells(row.result)])
+            below += [f"{row.item}: {sentence}" for sentence in mistakes(row.result)]
+    sizes = [title for key in POSE for title in (TITLES[key], "noise")]
+    table = Table("", ["recording", *sizes, last], lines)
+    return [*table.lines(), *(["", *below] if below else [])]
 
 
 def _missing(values: Values) -> str:

@@ -1,16 +1,23 @@
-"""An HTML page in one file: text, tables and pictures, for screen, phone and paper."""
+"""A report as an HTML page in one file, for screen, phone and paper, or as lines of a terminal."""
 
 from __future__ import annotations
 
 import base64
 import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from io import BytesIO
+from math import isfinite, isnan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
 
 from wrist_stiffness.atomic_file import writing
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.provenance import Provenance
 
 STYLE = """
 :root { color-scheme: light; }
@@ -40,21 +47,25 @@ li { margin: 0.3rem 0; }
 # The page may load nothing from anywhere, whatever text gets into it.
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
-NUMBER = re.compile(r"[-+±]?\d[\d.,]*(e[-+]?\d+)?( ± [\d.]+)?( %| s)?|[-–]?")
+NUMBER = re.compile(r"(\+-|[-+±])?\d[\d.,]*(e[-+]?\d+)?( (±|\+-) [\d.]+)?( %| s)?|[-–]?")
 
+SIGNS = {r"\bum\b": "µm", r"\+-": "±", r"\bdegC\b": "°C", r" deg/s\b": " °/s"}
+"""What texts have in ASCII, for terminals."""
 
-@dataclass(frozen=True)
-class Text:
-    """A paragraph."""
-
-    text: str
+TITLES = {
+    "s_um": "s [um]",
+    "phi_mdeg": "phi [mdeg]",
+    "gauges_um": "gauges [um]",
+    "tilts_mdeg": "tilts [mdeg]",
+}
+"""Of columns, by the key of the quantity."""
 
 
 @dataclass(frozen=True)
 class Bullets:
     """A list of sentences."""
 
-    items: tuple[str, ...]
+    items: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -62,8 +73,24 @@ class Table:
     """Rows of cells under a head, with one sentence above."""
 
     caption: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    @property
+    def numeric(self) -> list[bool]:
+        """Whether a column holds numbers, which stand to the right."""
+        columns = zip(*self.rows, strict=True) if self.rows else ((),) * len(self.head)
+        return [bool(column) and all(map(NUMBER.fullmatch, column)) for column in columns]
+
+    def lines(self) -> list[str]:
+        """Return head and rows for a terminal, columns as wide as they must be."""
+        rows = [self.head, *self.rows]
+        wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        sides = [f"{'>' if each else '<'}{n}" for each, n in zip(self.numeric, wide, strict=True)]
+        return [
+            "  ".join(f"{cell:{side}}" for cell, side in zip(row, sides, strict=True)).rstrip()
+            for row in rows
+        ]
 
 
 @dataclass(frozen=True)
@@ -74,15 +101,11 @@ class Picture:
     caption: str
 
 
-Part = Text | Bullets | Table | Picture
+Part: TypeAlias = str | Bullets | Table | Picture
+"""Of a section; a text is a paragraph."""
 
-
-@dataclass(frozen=True)
-class Section:
-    """A heading and what stands under it."""
-
-    heading: str
-    parts: tuple[Part, ...]
+Sections: TypeAlias = Mapping[str, Sequence[Part]]
+"""Parts by their heading, in the order in which they are read; one without parts is left out."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +115,8 @@ class Page:
     # `title`, `subtitle`: what it is about
     title: str
     subtitle: str
-    verdict: tuple[str, ...]  # the answer in a few sentences, before everything else
-    sections: tuple[Section, ...]  # in the order in which they are read
+    verdict: Sequence[str]  # the answer in a few sentences, before everything else
+    sections: Sections
 
 
 def drawn(figure: Any, caption: str) -> Picture:
@@ -106,22 +129,35 @@ def drawn(figure: Any, caption: str) -> Picture:
     return Picture(buffer.getvalue(), caption)
 
 
+def lines_of(sections: Sections) -> list[str]:
+    """Return sections for a terminal, without their pictures."""
+    out = []
+    for heading, parts in sections.items():
+        out += ["", heading] if parts else []
+        for part in parts:
+            if isinstance(part, str):
+                out.append(f"  {part}")
+            elif isinstance(part, Bullets):
+                out += [f"  - {item}" for item in part.items]
+            elif isinstance(part, Table):
+                out += [f"  {line}" for line in (part.caption, *part.lines())]
+    return out
+
+
 def html_of(page: Page) -> str:
     """Return the page as one HTML text that needs no other file."""
-    verdict = "".join(f"<p>{escape(line)}</p>" for line in page.verdict)
     sections = "\n".join(
-        f"<section><h2>{escape(section.heading)}</h2>\n"
-        + "\n".join(_part(part) for part in section.parts)
-        + "</section>"
-        for section in page.sections
+        f"<section><h2>{_text(heading)}</h2>\n" + "\n".join(map(_html, parts)) + "</section>"
+        for heading, parts in page.sections.items()
+        if parts
     )
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(page.title)}</title>\n<style>{STYLE}</style></head>\n<body>\n"
-        f'<h1>{escape(page.title)}</h1>\n<p class="subtitle">{escape(page.subtitle)}</p>\n'
-        f'<div class="verdict">{verdict}</div>\n{sections}\n</body></html>\n'
+        f"<title>{_text(page.title)}</title>\n<style>{STYLE}</style></head>\n<body>\n"
+        f'<h1>{_text(page.title)}</h1>\n<p class="subtitle">{_text(page.subtitle)}</p>\n'
+        f'<div class="verdict">{_each("p", page.verdict)}</div>\n{sections}\n</body></html>\n'
     )
 
 
@@ -132,36 +168,70 @@ def write_page(path: str | Path, page: Page) -> None:
         written.write_text(html_of(page), encoding="utf-8", errors="backslashreplace")
 
 
-def _part(part: Part) -> str:
-    if isinstance(part, Text):
-        return f"<p>{escape(part.text)}</p>"
+def _html(part: Part) -> str:
+    if isinstance(part, str):
+        return _each("p", [part])
     if isinstance(part, Bullets):
-        return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in part.items) + "</ul>"
+        return f"<ul>{_each('li', part.items)}</ul>"
+    caption = _text(part.caption)
     if isinstance(part, Picture):
         data = base64.b64encode(part.svg).decode("ascii")
-        caption = escape(part.caption)
         return (
             f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{caption}">'
             f"<figcaption>{caption}</figcaption></figure>"
         )
-    return _table(part)
-
-
-def _table(table: Table) -> str:
-    numeric = [
-        bool(table.rows) and all(NUMBER.fullmatch(row[column]) for row in table.rows)
-        for column in range(len(table.head))
-    ]
-
-    def cells(row: tuple[str, ...], tag: str) -> str:
-        return "".join(
-            f"<{tag}{' class=' + chr(34) + 'number' + chr(34) if is_number else ''}>"
-            f"{escape(cell)}</{tag}>"
-            for cell, is_number in zip(row, numeric, strict=True)
-        )
-
-    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in table.rows)
-    return (
-        f'<div class="wide"><table><caption>{escape(table.caption)}</caption>'
-        f"<thead><tr>{cells(table.head, 'th')}</tr></thead><tbody>{body}</tbody></table></div>"
+    classes = [' class="number"' if each else "" for each in part.numeric]
+    head, *body = (
+        "".join(f"<{tag}{c}>{_text(cell)}</{tag}>" for cell, c in zip(row, classes, strict=True))
+        for tag, row in [("th", part.head), *(("td", row) for row in part.rows)]
     )
+    rows = "".join(f"<tr>{row}</tr>" for row in body)
+    return (
+        f'<div class="wide"><table><caption>{caption}</caption>'
+        f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _each(tag: str, texts: Iterable[str]) -> str:
+    return "".join(f"<{tag}>{_text(text)}</{tag}>" for text in texts)
+
+
+def _text(text: str) -> str:
+    return escape(typeset(text))
+
+
+def typeset(text: str) -> str:
+    """Return a text with the signs that a page or a picture has."""
+    for plain, sign in SIGNS.items():
+        text = re.sub(plain, sign, text)
+    return text
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return significant digits, without an exponent where a person writes none; NaN is -."""
+    if isnan(value):
+        return "-"
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.{digits}g}"
+
+
+def plus_minus(value: float, sigma: float) -> str:
+    """Return a value and its uncertainty with two digits of the latter."""
+    digits = 3
+    if isfinite(sigma) and sigma > 0.0:
+        digits = min(max(1 - int(np.floor(np.log10(sigma))), 0), 9)
+    return f"{round(value, digits) + 0.0:.{digits}f} +- {sigma:.{digits}f}"
+
+
+def provenance_section(provenance: Provenance) -> Sections:
+    """Return where the result comes from."""
+    files = [("model", *each) for each in provenance.models.items()]
+    files += [("recording", *each) for each in provenance.recordings.items()]
+    rows = [(kind, name, sha[:16]) for kind, name, sha in files]
+    caption = "Files, with the first digits of their checksums."
+    return {
+        "Files and versions": (
+            f"Made on {provenance.date} by: {provenance.command}",
+            Table(caption, ("kind", "file", "SHA-256"), rows),
+            Table("Versions", ("package", "version"), list(provenance.versions.items())),
+        )
+    }

@@ -12,7 +12,7 @@ from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.model.formula_law import FORMULA_PLACES, SIGNALS
-from wrist_stiffness.report.diagnosis_lines import verdict_lines
+from wrist_stiffness.report.diagnosis_report import verdict_lines
 from wrist_stiffness.web.bench import Offer, Seen
 from wrist_stiffness.web.figures import SYMBOL, number, rms, spelled, unit_of
 from wrist_stiffness.web.tab import DEPENDS, VERSIONS, Tab

@@ -6,7 +6,7 @@ from functools import partial
 
 from nicegui import events, ui
 
-from wrist_stiffness.report.parts import plus_minus
+from wrist_stiffness.report.page import plus_minus
 from wrist_stiffness.web.figures import SYMBOL, number, spelled, unit_of
 from wrist_stiffness.web.tab import VERSIONS, Tab
 

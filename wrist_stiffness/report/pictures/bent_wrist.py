@@ -59,29 +59,29 @@ def moved_shapes(table: Table, configuration: Configuration, screws: Array) -> l
     `screws` (8, 6): elastic screw of each component at O in F [m, rad].
     """
     projectors = influence(configuration)
-    frames = [_frame_screws(laws, screws) for laws in projectors.of_frames()]
-    shapes = [_link(table, configuration, name, *_pair(frames, name)) for name in LINKS]
-    shapes += [_bushing(table, configuration, name, *_pair(frames, name)) for name in JOINTS]
+    halves = screws.reshape(-1, 2, 3)
+    # (8, 6) each: screw of the interface frame at the near and at the far end of each component.
+    near, far = (
+        np.einsum("mkij,khj->mhi", laws, halves).reshape(-1, 6) for laws in projectors.of_frames()
+    )
+    shapes = [
+        (_link if name in LINKS else _bushing)(table, configuration, name, *ends)
+        for name, *ends in zip(ELASTIC, near, far, strict=True)
+    ]
     return [*shapes, _platform(table, configuration, platform_twist(projectors, screws))]
 
 
 def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
     """Draw the wrist at angles (2,) [rad], rigid in grey, bent in colours of its displacement."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
     shapes = bent_shapes(table, theta, push)
-    largest = max(float(np.max(np.linalg.norm(shape.shift, axis=-1))) for shape in shapes)
+    largest = _largest(shapes)
     factor = round_down(SHOWN_M / largest) if largest > 0.0 else 1.0
-    colours = ScalarMappable(Normalize(0.0, 1e6 * largest), "viridis")
     figure = new_figure(8.0, 7.0)
     plot: Any = figure.add_subplot(projection="3d")
-    _draw_shapes(plot, shapes, factor, colours, 1e6)
+    colours = _draw_shapes(plot, shapes, factor, 1e6 * largest)
     _draw_load(plot, table, theta, push)
-    degrees = np.degrees(theta)
     plot.set_title(
-        f"{table.geometry.name} at ({degrees[0]:.0f}, {degrees[1]:.0f}) deg under "
-        f"{push.text}\ndisplacement exaggerated {factor:g} times; "
+        f"{_at(table, theta)} under {push.text}\ndisplacement exaggerated {factor:g} times; "
         "bars interpolated between their ends",
         fontsize=9,
     )
@@ -93,10 +93,6 @@ def draw_mode_shapes(
     table: Table, configuration: Configuration, modes: NaturalModes, path: Path
 ) -> None:
     """Draw the four slowest natural modes at one pose, a stack of one; rigid in grey."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    colours = ScalarMappable(Normalize(0.0, 1.0), "viridis")
     figure = new_figure(10.0, 9.0)
     # The layout does not see the names of vertical axes.
     figure.get_layout_engine().set(rect=(0.0, 0.0, 0.96, 1.0))
@@ -104,31 +100,42 @@ def draw_mode_shapes(
     for number in range(4):
         plot: Any = figure.add_subplot(2, 2, number + 1, projection="3d")
         shapes = moved_shapes(table, pose, modes.screws[0, number])
-        largest = max(float(np.max(np.linalg.norm(shape.shift, axis=-1))) for shape in shapes)
-        _draw_shapes(plot, shapes, SHOWN_M / largest, colours, 1.0 / largest, number == 0)
+        _draw_shapes(plot, shapes, SHOWN_M / _largest(shapes), 1.0, named=number == 0)
         plot.set_title(f"mode {number + 1}: {modes.frequency[0, number]:.0f} Hz", fontsize=10)
-    degrees = np.degrees(pose.theta)
     figure.suptitle(
-        f"{table.geometry.name} at ({degrees[0]:.0f}, {degrees[1]:.0f}) deg: natural modes, motors "
-        "locked, flanges as they rest\ncolour: displacement over the largest one",
+        f"{_at(table, pose.theta)}: natural modes, motors locked, flanges as they rest\n"
+        "colour: displacement over the largest one",
         fontsize=10,
     )
     save_figure(figure, path)
 
 
+def _at(table: Table, theta: Array) -> str:
+    return "{} at ({:.0f}, {:.0f}) deg".format(table.geometry.name, *np.degrees(theta))
+
+
+def _largest(shapes: list[Shape]) -> float:
+    return max(float(np.max(np.linalg.norm(shape.shift, axis=-1))) for shape in shapes)
+
+
 def _draw_shapes(
-    plot: Any,
-    shapes: list[Shape],
-    factor: float,
-    colours: Any,
-    colour_per_metre: float,
-    named: bool = True,
-) -> None:
+    plot: Any, shapes: list[Shape], factor: float, largest: float, named: bool = True
+) -> Any:
+    """Draw shapes with displacements times a factor, and return their colours.
+
+    `largest`: what the largest displacement is called, in the unit of the colours.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    colours = ScalarMappable(Normalize(0.0, largest), "viridis")
+    per_metre = largest / max(_largest(shapes), 1e-12)
     label = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
-    for name, shape in zip((*LINKS, *JOINTS, "platform"), shapes, strict=True):
+    for name, shape in zip((*ELASTIC, "platform"), shapes, strict=True):
         # The displacement decides the colour, millimetres the place.
-        size = colour_per_metre * np.linalg.norm(shape.shift, axis=-1)
-        faces = colours.to_rgba(0.25 * _corner_sum(size))
+        size = per_metre * np.linalg.norm(shape.shift, axis=-1)
+        rows = size[:-1] + size[1:]
+        faces = colours.to_rgba(0.25 * (rows[:, :-1] + rows[:, 1:]))
         bent = 1e3 * (shape.points + factor * shape.shift)
         rigid = 1e3 * shape.points
         plot.plot_surface(
@@ -144,15 +151,7 @@ def _draw_shapes(
     plot.set_xlabel("x [mm]")
     plot.set_ylabel("y [mm]")
     plot.set_zlabel("z [mm]")
-
-
-def _frame_screws(laws: Array, screws: Array) -> Array:
-    moved = np.einsum("mkij,khj->mhi", laws, screws.reshape(-1, 2, 3))
-    return moved.reshape(len(moved), 6)
-
-
-def _pair(frames: list[Array], name: str) -> tuple[Array, Array]:
-    return frames[0][ELASTIC.index(name)], frames[1][ELASTIC.index(name)]
+    return colours
 
 
 def _shift(points: Array, screw: Array) -> Array:
@@ -235,10 +234,6 @@ def _draw_load(plot: Any, table: Table, theta: Array, push: Push) -> None:
                 table.geometry.bushings[joint].radius,
             )
             plot.plot(*np.stack([1e3 * end * axis for end in ends]).T, color="black", linewidth=2.0)
-
-
-def _corner_sum(values: Array) -> Array:
-    return values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:]
 
 
 def round_down(value: float) -> float:

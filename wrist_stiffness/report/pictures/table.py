@@ -166,11 +166,12 @@ def draw_maps(table: Table, folder: str | Path, push: Push | None = None) -> lis
         values[inside] = np.linalg.norm(halves, axis=-1)
     names = ("map_s.png", "map_phi.png", "budget.png", "bent.png", "uncertainty.png")
     pictures = [folder / name for name in names]
-    s, phi = MICROMETRES * values[..., 0], MILLIDEGREES * values[..., 1]
-    label = "shift s of the platform at O [µm]"
-    draw_map(table, poses, s, label, load.text, pictures[0])
-    label = "rotation phi of the platform [mdeg]"
-    draw_map(table, poses, phi, label, load.text, pictures[1])
+    shown = (
+        ("shift s of the platform at O [µm]", MICROMETRES),
+        ("rotation phi of the platform [mdeg]", MILLIDEGREES),
+    )
+    for column, (label, unit) in enumerate(shown):
+        draw_map(table, poses, unit * values[..., column], label, load.text, pictures[column])
     draw_budget(table, found, load.text, pictures[2])
     draw_bent_wrist(table, PICTURED_POSE, load, pictures[3])
     draw_uncertainty(table, contributions(table), pictures[4])
