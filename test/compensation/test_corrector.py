@@ -10,13 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wrist_stiffness.compensation.corrector import Correcting, Corrector, search
+from wrist_stiffness.compensation.correction import correction_of
+from wrist_stiffness.compensation.corrector import Corrected, Corrector, search
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.objective import OBJECTIVES
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import UnreachablePoseError, WristError
-from wrist_stiffness.mechanism.compiled import CompiledCommands
+from wrist_stiffness.mechanism.compiled import CompiledCommands, CorrectedRows
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
@@ -36,7 +37,14 @@ def all_of_it(turn):
 
 
 def corrected(corrector, running, stamp_ns, theta, load, own=SETTINGS):
-    return corrector.command(running, own, stamp_ns, theta, None, load, all_of_it)
+    if load is not None and running.compiled is not None:
+        arrays = np.array([stamp_ns]), theta[None], load.wrench[None], np.array([load.on_platform])
+        found = CorrectedRows.room(1, running.compiled.sectors)
+        one = CompiledCommands(*arrays, np.array([True]), np.ones(1))
+        if corrector.correct(running, running.compiled, own, one, found):
+            correction = correction_of(found, 0, running.model, load)
+            return Corrected(correction.delta, correction, None, load)
+    return corrector.searched(running, own, stamp_ns, theta, None, load, all_of_it)
 
 
 @settings(max_examples=60)
@@ -95,13 +103,15 @@ def commands(count, seed):
 def test_a_block_is_its_commands_one_by_one_to_the_bit(seed):
     block = commands(400, seed)
     running, together, alone = running_model(), Corrector(), Corrector()
-    correcting = Correcting(together, running, running.compiled, SETTINGS, block)
-    place = correcting.correct(0)
+    rows, faults = CorrectedRows.room(len(block.wanted), running.compiled.sectors), {}
+    own = running, running.compiled, SETTINGS, block, rows, None
+    place = together.correct(*own)
     while place < len(block.wanted):
         load = Load(block.load[place], bool(block.on_platform[place]))
-        correcting.correct_in_python(place, load, 1.0)
-        place = correcting.correct(place + 1)
-    rows, faults = correcting.found, correcting.faults
+        arguments = int(block.stamp_ns[place]), block.theta[place], None, load, all_of_it
+        one = together.searched(running, SETTINGS, *arguments)
+        faults[place], rows.applied[place] = one.fault, one.delta
+        place = together.correct(*own, place + 1)
     running = running_model()
     for i, stamp_ns in enumerate(block.stamp_ns.tolist()):
         load = Load(block.load[i], bool(block.on_platform[i])) if block.wanted[i] else None

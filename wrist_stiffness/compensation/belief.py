@@ -1,27 +1,26 @@
-"""What a supervisor believes of the load; for blocks of commands it goes in and out as one row.
+"""What a supervisor believes of the load.
 
 The compiled rules (`mechanism/native/supervisor.c`) are those of `supervisor.py`, to the bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from ctypes import Structure, c_double
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.payload import (
     ENOUGH,
     SIGMAS,
     Payload,
     PayloadEstimate,
-    Row,
     Thresholds,
 )
 from wrist_stiffness.compensation.scales import Scales
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.compiled import CompiledSupervisor, Flags
 from wrist_stiffness.model.block import Load
 
 
@@ -85,50 +84,9 @@ YIELD_S = 0.1
 slew limit takes back 50 mdeg [s]."""
 
 
-class AppliedShare:
-    """Part of a correction that is applied.
-
-    While the moment of a contact works against the correction's turn, the part falls towards none.
-    It comes back when the command has left that place, never before, so that nothing can oscillate.
-    """
-
-    def __init__(self) -> None:
-        self.value = 1.0  # [-]
-        # whether it is known what is carried; where it is not, the correction fades
-        self.sure = False
-        # (3,), moment of a contact, along u, v and down; None where there is none [N m]
-        self.against: Row | None = None
-        self.place: list[float] | None = None  # (2,), command at which the correction yielded [rad]
-
-    @property
-    def settled(self) -> bool:
-        """Whether all is applied whatever the correction, and goes on to be."""
-        return self.against is None and self.sure and self.value == 1.0
-
-    def leave(self, theta: list[float], reach: float) -> None:
-        """Hear of a command (2,) [rad]; one farther than `reach` [rad] has left the place."""
-        if self.place is not None and apart(theta, self.place) > reach:
-            self.place = None
-
-    def after(self, seconds: float, turn: Row) -> float:
-        """Let time [s] pass with a correction that turns the platform by (3,), along u, v, down."""
-        if self.against is not None and _dot(self.against, turn) < 0.0:
-            self.value = max(0.0, self.value - seconds / YIELD_S)
-        elif not self.sure:
-            self.value = max(0.0, self.value - seconds / RAMP_S)
-        elif self.against is None and self.place is None:
-            self.value = min(1.0, self.value + seconds / RAMP_S)
-        return self.value
-
-
-def apart(theta: list[float], other: list[float]) -> float:
+def apart(theta: Sequence[float], other: Sequence[float]) -> float:
     """Return how far two commands (2,) are apart, the larger of both motors [rad]."""
     return max(abs(theta[0] - other[0]), abs(theta[1] - other[1]))
-
-
-def _dot(a: Row, b: Row) -> float:
-    # Not `sum`, which rounds otherwise from Python 3.12 on.
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 JUDGE_S = 0.1
@@ -157,36 +115,56 @@ NEW_WEIGHT = "a weight that was not there before is being judged"
 NO_WEIGHT = "the load is no weight: a contact, or the sensor is not tared"
 CHANGES = "the load changes with the correction: a contact"
 
-STATES = tuple(State)
 TEXTS = ("", NO_LOAD, NEW_WEIGHT, NO_WEIGHT, CHANGES)
 
+STATES = tuple(State)
+UNSURE, FREE, HOLDING, IN_CONTACT, RELEASED = range(len(STATES))
 
-class Belief:
-    """What is kept from command to command.
+
+def _numbers(names: str) -> list[tuple[str, type[c_double]]]:
+    return [(name, c_double) for name in names.split()]
+
+
+class Belief(Structure):
+    """What is kept from command to command, `Supervisor` of `wrist.h`: Python and C go on from it.
 
     `followed`: the last load that was followed as it was measured.
     """
 
+    _fields_ = [
+        *[("rules", c_double * 17), ("axes", c_double * 10)],  # see `compiled`
+        # `state`, `seen`: places in `STATES`; `text`: in `TEXTS`
+        *_numbers("state seen text told seen_s step_s candidate_s rest_s counts"),
+        *_numbers("weight departure trust"),
+        # Which part of a correction is applied [-], and whether it is known what is carried.
+        *_numbers("part sure"),
+        # Moment of a contact, along u, v and down [N m]; whether there is one stands before it.
+        *[("is_against", c_double), ("against", c_double * 3)],
+        # Commands, likewise: where the correction yielded, one that comes after with a delay, and
+        # where the command has stayed [rad].
+        *[("yielded", c_double), ("place", c_double * 2)],
+        *[("moves", c_double), ("behind", c_double * 2)],
+        *[("stands", c_double), ("stand", c_double * 2)],
+        *[(name, PayloadEstimate) for name in ("payload", "candidate", "expected")],
+        ("judged", c_double),  # whether the command at which the compiled loop ended was judged
+    ]
+
     def __init__(self) -> None:
+        super().__init__()
+        self._row = np.frombuffer(self)  # type: ignore[call-overload]
+        self.stamps = np.zeros(2, dtype=np.int64)  # of last command and state [ns]
         self.scatter = Thresholds(0.0, 0.0)  # the least thresholds, from the noise of the load
         self._scales: Scales | None = None
         self._expected: Payload | None = None
-        self._told = False
         self.forget()
 
     def forget(self) -> None:
         """Judge anew; what the gripper told still stands."""
-        self._stamp_ns = self._since_ns = 0
-        self._state = self._seen = State.UNSURE
-        self._text = NO_LOAD
-        self._seen_s = self._step_s = self._candidate_s = 0.0
-        self._payload: PayloadEstimate | None = None
-        self._candidate: PayloadEstimate | None = None
-        self._weight = self._departure = self._trust = 1.0
-        self._share = AppliedShare()
-        self._behind: list[float] | None = None
-        self._place: list[float] | None = None
-        self._rest_s = self._counts = 0.0
+        told = self.told
+        self._row[:] = 0.0
+        self.stamps[:] = 0
+        self.told, self.text = told, TEXTS.index(NO_LOAD)
+        self.weight = self.departure = self.trust = self.part = 1.0
         self.followed: Load | None = None
 
     def limit(self, settings: SupervisorSettings) -> Thresholds:
@@ -194,74 +172,27 @@ class Belief:
         force = max(settings.limit.force, self.scatter.force)
         return Thresholds(force, max(settings.limit.moment, self.scatter.moment))
 
-    def rows(
-        self, scales: Scales, settings: SupervisorSettings, reach: float
-    ) -> tuple[Array, NDArray[np.int64]]:
-        """Return what compiled rules need, and the stamps of last command and state (2,) [ns].
+    def compiled(
+        self, scales: Scales, settings: SupervisorSettings, reach: float, valid: Flags
+    ) -> CompiledSupervisor:
+        """Return itself for the compiled rules, which change it.
 
-        `settings`: as of `Supervisor.judge`; `reach`: as there [rad].
+        `settings`, `reach`: as of `Supervisor.judge`; `valid` (n,): see `CompiledSupervisor`.
         """
-        expected = None if self._expected is None else scales.estimate(self._expected)
-        share, of_wrist = self._share, scales.geometry.limits
-        row = [
+        of_wrist = scales.geometry.limits
+        self.rules = (
             *(JUDGE_S, SETTLE_S, LATE_S, LONGEST_STEP_S, RAMP_S, YIELD_S),
             *(CALM, OPEN, SIGMAS, ENOUGH, settings.follow, settings.trust),
-            *(
-                *self.limit(settings),
-                reach,
-                of_wrist.encoder_step,
-                of_wrist.moment,
-                *scales.constants,
-            ),
-            *(STATES.index(self._state), STATES.index(self._seen), TEXTS.index(self._text)),
-            *(self._told, self._seen_s, self._step_s, self._candidate_s, self._rest_s),
-            *(self._counts, self._weight, self._departure, self._trust, share.value, share.sure),
-            *(*_known(share.against, 3), *_known(share.place, 2)),
-            *(*_known(self._behind, 2), *_known(self._place, 2)),
-        ]
-        for payload in (self._payload, self._candidate, expected):
-            row += _known(None if payload is None else payload.row, 11)
-        return np.array([*row, 0.0]), np.array([self._stamp_ns, self._since_ns], dtype=np.int64)
+            *(*self.limit(settings), reach, of_wrist.encoder_step, of_wrist.moment),
+        )
+        self.axes = tuple(scales.constants)
+        known = self._expected is not None
+        self.expected = scales.estimate(self._expected) if known else PayloadEstimate()
+        return CompiledSupervisor(self._row, self.stamps, valid)
 
-    def take_over(self, row: Array, stamps: NDArray[np.int64]) -> bool:
-        """Believe what compiled rules left, and tell whether they judged the last command.
-
-        `row`, `stamps` (SUPERVISOR,) float, (2,) int: from `rows`.
-        """
-        self._stamp_ns, self._since_ns = stamps.tolist()
-        values = iter(row[RULES:].tolist())
-        state, seen, text, told = (int(next(values)) for _ in range(4))
-        self._state, self._seen, self._text = STATES[state], STATES[seen], TEXTS[text]
-        self._told = bool(told)
-        self._seen_s, self._step_s, self._candidate_s, self._rest_s = _take(values, 4)
-        self._counts, self._weight, self._departure, self._trust = _take(values, 4)
-        share = self._share
-        share.value, share.sure = next(values), bool(next(values))
-        against, share.place = _found(values, 3), _found(values, 2)
-        share.against = None if against is None else (against[0], against[1], against[2])
-        self._behind, self._place = _found(values, 2), _found(values, 2)
-        payload, candidate, expected = (_found(values, 11) for _ in range(3))
-        self._payload = None if payload is None else PayloadEstimate.of_row(payload)
-        self._candidate = None if candidate is None else PayloadEstimate.of_row(candidate)
-        if expected is None:
-            self._expected = None
+    def go_on(self) -> bool:
+        """Go on from what compiled rules left, and tell whether they judged the last command."""
         self.followed = None
-        return bool(next(values))
-
-
-RULES = 17 + 10
-"""Numbers of `Belief.rows` before what is believed: settings and scales."""
-
-
-def _known(numbers: Sequence[float] | None, count: int) -> list[float]:
-    """Return numbers behind whether they are there."""
-    return [0.0] * (1 + count) if numbers is None else [1.0, *numbers]
-
-
-def _take(values: Iterator[float], count: int) -> list[float]:
-    return [next(values) for _ in range(count)]
-
-
-def _found(values: Iterator[float], count: int) -> list[float] | None:
-    known, *numbers = _take(values, 1 + count)
-    return numbers if known else None
+        if not self.expected.known:
+            self._expected = None
+        return bool(self.judged)

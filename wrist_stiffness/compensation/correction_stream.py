@@ -15,10 +15,12 @@ from wrist_stiffness.compensation.corrected import (
     CorrectedCommand,
     CorrectedTrajectory,
 )
-from wrist_stiffness.compensation.corrector import Correcting, Corrector
+from wrist_stiffness.compensation.correction import correction_of
+from wrist_stiffness.compensation.corrector import Corrected, Corrector
 from wrist_stiffness.compensation.intake import COMMAND
 from wrist_stiffness.compensation.load_history import NANOSECONDS, Zero
 from wrist_stiffness.compensation.payload import Thresholds
+from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.safety import require_within_limits, within_limits
 from wrist_stiffness.compensation.scales import Held
 from wrist_stiffness.compensation.settings import StreamSettings
@@ -26,7 +28,12 @@ from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.compensation.supervisor import Supervisor
 from wrist_stiffness.compensation.trajectory_plan import PlanCorrector, PlannedPoint
 from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, WristError
-from wrist_stiffness.mechanism.compiled import CompiledCommands, CompiledSupervisor
+from wrist_stiffness.mechanism.compiled import (
+    CompiledCommands,
+    CompiledWrist,
+    CorrectedRows,
+    Flags,
+)
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.model.error_model import ErrorModel, Load
@@ -126,39 +133,25 @@ class CorrectionStream(Stream):
             self._remember(stamp_ns, theta, None, theta_dot)
             twice = InputError(TWICE) if self.correcting else None
             return CorrectedCommand(frame_id, np.array(positions, float), theta, None, twice)
-        load: Load | None = None
-        fault: WristError | None = None
-        correcting = self.correcting
-        if correcting:
-            load, fault = self._judged(stamp_ns, theta)
-        delta, correction = NOTHING, None
+        one = Corrected(NOTHING, None, None, None)
         if self._running is not None:
-            corrected = self._corrector.command(
-                self._running,
-                self.settings,
-                stamp_ns,
-                theta,
-                theta_dot,
-                load,
-                self.supervisor.settled or self.supervisor.share,
-            )
-            delta, correction = corrected.delta, corrected.correction
-            fault = fault or corrected.fault
-        driven = theta + delta
-        forgotten = self._remember(stamp_ns, driven, load, theta_dot)
-        if correcting:
+            one = self._corrected(self._running, stamp_ns, theta, theta_dot)
+        driven = theta + one.delta
+        fault = one.fault
+        forgotten = self._remember(stamp_ns, driven, one.load, theta_dot)
+        if self.correcting:
             fault = fault or forgotten
         sent = list(positions)
         first, second = self.settings.motors.places(names)
         sent[first], sent[second] = driven.tolist()
-        marked = correcting or any(delta.tolist())
+        marked = self.correcting or any(one.delta.tolist())
         return CorrectedCommand(
             CORRECTED_FRAME if marked else frame_id,
             np.array(sent, float),
             driven,
-            correction,
+            one.correction,
             fault,
-            correction is not None and self.supervisor.valid,
+            one.correction is not None and self.supervisor.valid,
         )
 
     @property
@@ -181,42 +174,42 @@ class CorrectionStream(Stream):
         `stamps` (n,): not falling [ns]; `theta` (n, 2): motor angles, finite and within the joint
         limits [rad]; `theta_dot` (n, 2): their speeds [rad/s].
         """
-        running, settings, supervisor = self.running_model(), self.settings, self.supervisor
+        running, n = self.running_model(), len(stamps)
         compiled = running.compiled
         if compiled is None or not self.in_blocks:
-            speeds = [()] * len(stamps) if theta_dot is None else theta_dot.tolist()
+            speeds = [()] * n if theta_dot is None else theta_dot.tolist()
             each = zip(stamps.tolist(), theta.tolist(), speeds, strict=True)
-            names = settings.motors.motor_1, settings.motors.motor_2
+            names = self.settings.motors.motor_1, self.settings.motors.motor_2
             ones = (self.on_command(at, "", names, angles, speed) for at, angles, speed in each)
-            return CorrectedBlock.of(ones, len(stamps))
-        n, valid = len(stamps), np.zeros(len(stamps), dtype=bool)
+            return CorrectedBlock.of(ones, n)
         commands = CompiledCommands(stamps, theta, *self.loads.block_at(stamps), np.ones(n))
-        block = Correcting(self._corrector, running, compiled, settings, commands)
-        scales = supervisor.scales(running.model.table.geometry)
+        found, valid = CorrectedRows.room(n, compiled.sectors), np.zeros(n, dtype=bool)
+        faults: dict[int, WristError] = {}
         place = 0
         while place < n:
-            judged = False
+            load: Load | None = None
             if commands.wanted[place]:
-                rows = supervisor.rows(scales, settings.supervisor, settings.correction_limit)
-                begin, place = place, block.correct(place, CompiledSupervisor(*rows, valid))
-                judged = supervisor.take_over(*rows)
-                last = min(place, n - 1) if judged else place - 1
-                if settings.supervisor.follow and last >= begin:
-                    supervisor.followed = _load_at(commands, last)
+                place, load = self._compiled(running, compiled, commands, found, valid, place)
             if place < n:
-                self._correct_one(block, place, judged)
-                valid[place] = supervisor.valid
+                one = self._searched(running, int(stamps[place]), theta[place], None, load)
+                if one.fault is not None:
+                    faults[place] = one.fault
+                found.applied[place] = one.delta
+                if one.correction is not None:
+                    at = one.correction.prediction
+                    found.put(place, one.correction.after, at.twist, at.configuration)
+                valid[place] = self.supervisor.valid
                 place += 1
         corrected = np.ones(n, dtype=bool)
-        corrected[list(block.faults)] = False
-        there = Configuration.of_row(np.ascontiguousarray(block.found.configuration))
-        covariance = running.model.table_covariance(there, np.ascontiguousarray(block.found.twist))
+        corrected[list(faults)] = False
+        there = Configuration.of_row(np.ascontiguousarray(found.configuration))
+        covariance = running.model.table_covariance(there, np.ascontiguousarray(found.twist))
         return CorrectedBlock(
-            theta + block.found.applied,
+            theta + found.applied,
             corrected,
-            np.ascontiguousarray(block.found.after),
+            np.ascontiguousarray(found.after),
             covariance,
-            block.faults,
+            faults,
             there.platform,
             valid,
         )
@@ -308,6 +301,72 @@ class CorrectionStream(Stream):
             return error
         return None
 
+    def _corrected(
+        self, running: RunningModel, stamp_ns: int, theta: Array, theta_dot: Array | None
+    ) -> Corrected:
+        """Correct one command: as a block of one, else in Python."""
+        compiled, load = running.compiled, None
+        commands = self._block_of_one(stamp_ns, theta) if self.correcting else None
+        if compiled is not None and commands is not None:
+            found, valid = CorrectedRows.room(1, compiled.sectors), np.empty(1, dtype=bool)
+            end, load = self._compiled(running, compiled, commands, found, valid)
+            if end == 1 and load is not None:
+                correction = correction_of(found, 0, running.model, load)
+                return Corrected(correction.delta, correction, None, load)
+        return self._searched(running, stamp_ns, theta, theta_dot, load)
+
+    def _block_of_one(self, stamp_ns: int, theta: Array) -> CompiledCommands | None:
+        """Return a command with its load, None where no load is known."""
+        try:
+            _, load = self.loads.at(stamp_ns)
+        except WristError:
+            return None
+        wanted, on_platform = np.ones(1, dtype=bool), np.array([load.on_platform])
+        stamps, wrench = np.array([stamp_ns]), load.wrench[None]
+        return CompiledCommands(stamps, theta[None], wrench, on_platform, wanted, np.ones(1))
+
+    def _compiled(
+        self,
+        running: RunningModel,
+        compiled: CompiledWrist,
+        commands: CompiledCommands,
+        found: CorrectedRows,
+        valid: Flags,
+        begin: int = 0,
+    ) -> tuple[int, Load | None]:
+        """Judge and correct commands from a place on.
+
+        Gives the first that this cannot serve, and the load to correct for of the last command that
+        was judged: of that one if any.
+        """
+        supervisor, settings = self.supervisor, self.settings
+        scales = supervisor.scales(running.model.table.geometry)
+        rules = settings.supervisor, settings.correction_limit
+        judging = supervisor.compiled(scales, *rules, valid)
+        corrector = self._corrector
+        end = corrector.correct(running, compiled, settings, commands, found, judging, begin)
+        judged = supervisor.go_on()
+        last = min(end, len(valid) - 1) if judged else end - 1
+        if settings.supervisor.follow and last >= begin:
+            supervisor.followed = _load_at(commands, last)
+        return end, _load_at(commands, last) if judged else None
+
+    def _searched(
+        self,
+        running: RunningModel,
+        stamp_ns: int,
+        theta: Array,
+        theta_dot: Array | None,
+        load: Load | None,
+    ) -> Corrected:
+        """Correct one command in Python, for a load that was judged or, if None, is to be."""
+        fault: WristError | None = None
+        if load is None and self.correcting:
+            load, fault = self._judged(stamp_ns, theta)
+        share, own = self.supervisor.share, self._corrector
+        one = own.searched(running, self.settings, stamp_ns, theta, theta_dot, load, share)
+        return one._replace(fault=fault or one.fault)
+
     def _judged(self, stamp_ns: int, theta: Array) -> tuple[Load | None, WristError | None]:
         """Return the load to correct for, or why there is none."""
         try:
@@ -317,7 +376,7 @@ class CorrectionStream(Stream):
             if isinstance(error, StaleLoadError):
                 self.supervisor.lost()
             return None, error
-        if self.supervisor.since_ns == stamp_ns:
+        if self.supervisor.stamps[1] == stamp_ns:
             # With another payload the hysteresis begins anew.
             self._corrector.release()
         return load, None
@@ -342,23 +401,13 @@ class CorrectionStream(Stream):
         )
         return Load(np.zeros(6) if judged is None else np.array(judged))
 
-    def _correct_one(self, block: Correcting, place: int, judged: bool) -> None:
-        """Correct a command of a block that the compiled formulas cannot serve, as a live one."""
-        commands, fault = block.commands, None
-        load: Load | None = _load_at(commands, place)
-        if not judged:
-            load, fault = self._judged(int(commands.stamp_ns[place]), commands.theta[place])
-        block.correct_in_python(place, load, self.supervisor.settled or self.supervisor.share)
-        if fault is not None:
-            block.faults[place] = fault
-
     def _held_by(self, stamp_ns: int, first: Array | None) -> Held:
         """Return what a plan is corrected for, that begins at motor angles (2,) [rad].
 
         Where no commands come, the loads before the plan are judged as at its first point.
         """
         self.loads.at(stamp_ns)
-        start_ns = max(self.supervision.stamp_ns, stamp_ns - PLAN_WINDOW_NS)
+        start_ns = max(int(self.supervisor.stamps[0]), stamp_ns - PLAN_WINDOW_NS)
         if first is not None:
             for load_ns, load in self.loads.since(start_ns, stamp_ns):
                 self._load_for(load_ns, first, load)

@@ -12,6 +12,8 @@ arrays have three elements, and this is done for every command.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from ctypes import Structure, c_double
 from dataclasses import dataclass
 from math import isfinite, sqrt
 from typing import NamedTuple
@@ -98,31 +100,25 @@ class Reading(NamedTuple):
         return self.aside(limit) <= 1.0 and self.weight > limit.force
 
 
-class PayloadEstimate:
-    """Weight and moments of a payload by a Kalman filter of a constant.
+class PayloadEstimate(Structure):
+    """Weight and moments of a payload by a Kalman filter of a constant; `Estimate` of `wrist.h`."""
 
-    `weight` [N].  `moments`: weight times centre in U [N m].  `open_moment`: standard deviation of
-    each moment [N m]; 0 where they are known.
-    """
-
-    def __init__(self, weight: float, moments: Row, open_moment: float) -> None:
-        variance = open_moment * open_moment
-        self.weight, self.moments = weight, moments
-        self._readings = 0.0 if variance else ENOUGH
-        self._spread: tuple[float, ...] = (variance, 0.0, 0.0, variance, 0.0, variance)
-
-    @property
-    def row(self) -> list[float]:
-        """All 11 numbers, as `of_row` takes them."""
-        return [self.weight, *self.moments, self._readings, *self._spread]
+    _fields_ = [
+        ("known", c_double),  # whether there is one at all
+        ("weight", c_double),  # [N]
+        ("moments", c_double * 3),  # weight times centre in U [N m]
+        ("readings", c_double),  # that were learned from, as far as they are independent [-]
+        ("spread", c_double * 6),  # covariance of the moments: xx, xy, xz, yy, yz, zz [N^2 m^2]
+    ]
+    moments: Sequence[float]
+    spread: Sequence[float]
 
     @classmethod
-    def of_row(cls, row: list[float]) -> PayloadEstimate:
-        """Return an estimate from its `row`."""
-        weight, x, y, z, readings, *spread = row
-        estimate = cls(weight, (x, y, z), 0.0)
-        estimate._readings, estimate._spread = readings, tuple(spread)
-        return estimate
+    def of(cls, weight: float, moments: Row, open_moment: float) -> PayloadEstimate:
+        """Return an estimate; `open_moment`: standard deviation of each moment, 0 where known."""
+        variance = open_moment * open_moment
+        readings = 0.0 if variance else ENOUGH
+        return cls(1.0, weight, moments, readings, (variance, 0.0, 0.0, variance, 0.0, variance))
 
     def rest(self, reading: Reading) -> Reading:
         """Return what of a load the payload does not explain."""
@@ -139,7 +135,7 @@ class PayloadEstimate:
 
     def open_moment(self, rows: tuple[Row, Row]) -> float:
         """Return how far its moments at a pose may be from what is known of them [N m]."""
-        return SIGMAS * sqrt(max(_quadratic(self._spread, row) for row in rows))
+        return SIGMAS * sqrt(max(_quadratic(self.spread, row) for row in rows))
 
     def explains(self, reading: Reading, limit: Thresholds, counts: float) -> bool:
         """Tell whether a load is the payload's, within thresholds and what poses left open.
@@ -154,15 +150,15 @@ class PayloadEstimate:
         left_u = about_u - (ax * x + ay * y + az * z)
         left_v = about_v - (bx * x + by * y + bz * z)
         noise = limit.moment * limit.moment / (SIGMAS * SIGMAS)
-        of_u, of_v = _quadratic(self._spread, row_u), _quadratic(self._spread, row_v)
+        of_u, of_v = _quadratic(self.spread, row_u), _quadratic(self.spread, row_v)
         moment = left_u * left_u / (noise + of_u) + left_v * left_v / (noise + of_v)
         if moment + about_down * about_down / noise > SIGMAS * SIGMAS:
             return False
         if not counts:
             return True
-        if self._readings < ENOUGH:
-            self._readings += counts
-            self.weight += counts * force / self._readings
+        if self.readings < ENOUGH:
+            self.readings += counts
+            self.weight += counts * force / self.readings
         if ENOUGH * of_u > noise:
             self._learn(row_u, about_u, noise / counts)
         if ENOUGH * of_v > noise:
@@ -170,7 +166,7 @@ class PayloadEstimate:
         return True
 
     def _learn(self, row: Row, value: float, noise: float) -> None:
-        xx, xy, xz, yy, yz, zz = self._spread
+        xx, xy, xz, yy, yz, zz = self.spread
         a, b, c = row
         px, py, pz = xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c
         variance = a * px + b * py + c * pz
@@ -178,7 +174,7 @@ class PayloadEstimate:
         gain = 1.0 / (variance + noise)
         step = gain * (value - a * x - b * y - c * z)
         self.moments = x + px * step, y + py * step, z + pz * step
-        self._spread = (
+        self.spread = (
             xx - gain * px * px,
             xy - gain * px * py,
             xz - gain * px * pz,
@@ -188,7 +184,7 @@ class PayloadEstimate:
         )
 
 
-def _quadratic(spread: tuple[float, ...], row: Row) -> float:
+def _quadratic(spread: Sequence[float], row: Row) -> float:
     xx, xy, xz, yy, yz, zz = spread
     a, b, c = row
     return a * a * xx + b * b * yy + c * c * zz + 2.0 * (a * b * xy + a * c * xz + b * c * yz)

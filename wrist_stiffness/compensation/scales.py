@@ -113,13 +113,13 @@ class Scales:
 
     def unknown(self, reading: Reading) -> PayloadEstimate:
         """Return the estimate of a payload of which a reading's weight is all that is known."""
-        return PayloadEstimate(reading.weight, (0.0, 0.0, 0.0), self.geometry.limits.moment)
+        return PayloadEstimate.of(reading.weight, (0.0, 0.0, 0.0), self.geometry.limits.moment)
 
     def estimate(self, payload: Payload) -> PayloadEstimate:
         """Return a payload as an estimate that is known."""
         weight = payload.mass_kg * self._g
         x, y, z = payload.centre_m
-        return PayloadEstimate(weight, (weight * x, weight * y, weight * z), 0.0)
+        return PayloadEstimate.of(weight, (weight * x, weight * y, weight * z), 0.0)
 
     def payload(self, estimate: PayloadEstimate) -> Payload:
         """Return an estimate as a payload."""
