@@ -13,7 +13,7 @@ from pathlib import Path
 
 from wrist_stiffness.commands.replay import pose_message
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
-from wrist_stiffness.compensation.load_history import LoadIntake
+from wrist_stiffness.compensation.load_history import LoadHistory
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import StaleLoadError, WristError
@@ -142,7 +142,7 @@ def _explained_by_late_loads(
     return explained
 
 
-def _newest_first(loads: LoadIntake, stamp_ns: int) -> Iterator[Load]:
+def _newest_first(loads: LoadHistory, stamp_ns: int) -> Iterator[Load]:
     """Yield the load that belongs to a stamp, then those that a late one may have left in use."""
     for _ in range(1 + LATE_LOADS):
         try:

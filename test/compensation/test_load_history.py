@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wrist_stiffness.compensation.intake import Frames
-from wrist_stiffness.compensation.load_history import LoadHistory, LoadIntake
+from wrist_stiffness.compensation.load_history import LoadHistory
 from wrist_stiffness.compensation.payload import Thresholds
 from wrist_stiffness.errors import InputError, StaleLoadError
 from wrist_stiffness.model.error_model import Load
@@ -24,10 +24,10 @@ stamps = st.integers(SECOND, SECOND + SECOND // 2)
 
 @given(st.lists(stamps, min_size=1, max_size=30), st.integers(SECOND // 2, 3 * SECOND))
 def test_the_newest_load_that_is_not_younger_belongs_to_a_joint_state(arriving, asked):
-    history = LoadHistory(AGE_LIMIT_S)
+    history = LoadHistory(AGE_LIMIT_S, Frames())
     last = {}
     for value, stamp in enumerate(arriving):
-        history.add(stamp, load_of(value))
+        history.keep(stamp, load_of(value))
         last[stamp] = value
     older = [stamp for stamp in arriving if stamp <= asked]
     if older and asked - max(older) <= SECOND // 2:
@@ -41,15 +41,15 @@ def test_the_newest_load_that_is_not_younger_belongs_to_a_joint_state(arriving, 
 
 @given(st.permutations(range(8)))
 def test_arrival_order_does_not_matter(order):
-    history = LoadHistory(AGE_LIMIT_S)
+    history = LoadHistory(AGE_LIMIT_S, Frames())
     for i in order:
-        history.add(SECOND + i, load_of(i))
+        history.keep(SECOND + i, load_of(i))
     assert [history.at(SECOND + i)[1].wrench[0] for i in range(8)] == list(range(8))
 
 
 def test_a_stale_load_is_named_with_age_and_limit():
-    history = LoadHistory(AGE_LIMIT_S)
-    history.add(SECOND, load_of(1))
+    history = LoadHistory(AGE_LIMIT_S, Frames())
+    history.keep(SECOND, load_of(1))
     with pytest.raises(StaleLoadError, match=r"1\.250 s older.*limit 0\.5 s"):
         history.at(2 * SECOND + SECOND // 4)
 
@@ -58,37 +58,37 @@ def test_loads_that_come_too_late_for_their_joint_state_are_counted():
     # load stamps      10       12   13
     # joint state          11           14
     # arrival: 10, ask 11, 12, ask 14, 13 (late), 15
-    history = LoadHistory(AGE_LIMIT_S)
-    history.add(10, load_of(10))
+    history = LoadHistory(AGE_LIMIT_S, Frames())
+    history.keep(10, load_of(10))
     history.at(11)
-    history.add(12, load_of(12))
+    history.keep(12, load_of(12))
     assert history.late == 0
     history.at(14)
-    history.add(13, load_of(13))
+    history.keep(13, load_of(13))
     assert history.late == 1
-    history.add(15, load_of(15))
+    history.keep(15, load_of(15))
     assert history.late == 1
 
 
 def test_after_the_clock_jumped_back_old_loads_are_forgotten():
-    history = LoadHistory(AGE_LIMIT_S)
+    history = LoadHistory(AGE_LIMIT_S, Frames())
     for i in range(10):
-        history.add(100 * SECOND + i, load_of(1))
-    history.add(2 * SECOND, load_of(2))
+        history.keep(100 * SECOND + i, load_of(1))
+    history.keep(2 * SECOND, load_of(2))
     assert history.at(2 * SECOND)[1].wrench[0] == 2
     assert len(history) == 1
 
 
 def test_memory_is_bounded_and_the_newest_stay():
-    history = LoadHistory(AGE_LIMIT_S)
+    history = LoadHistory(AGE_LIMIT_S, Frames())
     for i in range(3 * LoadHistory.CAPACITY):
-        history.add(i, load_of(i))
+        history.keep(i, load_of(i))
     assert len(history) == LoadHistory.CAPACITY
     assert history.at(3 * LoadHistory.CAPACITY)[1].wrench[0] == 3 * LoadHistory.CAPACITY - 1
 
 
 def intake():
-    return LoadIntake(Frames(), AGE_LIMIT_S)
+    return LoadHistory(AGE_LIMIT_S, Frames())
 
 
 def tare(loads):

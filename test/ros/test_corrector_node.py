@@ -73,7 +73,7 @@ def send_settled(graph, stamp_ns, theta=THETA, names=NAMES, frame_id=""):
 
 def send_load(graph, node, stamp_ns, wrench=DOWN):
     graph.load(stamp_ns, wrench)
-    graph.until(lambda: node.stream.loads.history.newest_ns == stamp_ns, "load")
+    graph.until(lambda: node.stream.loads.newest_ns == stamp_ns, "load")
 
 
 def expected(model, theta=THETA, name="pointing"):
@@ -244,7 +244,7 @@ def test_of_two_correctors_in_a_chain_only_one_corrects(graph, corrector, model,
     graph.connected("/second/motor_commands_corrected")
     graph.until(lambda: graph.probe.count_subscribers("/motor_commands_corrected") == 2, "chain")
     send_load(graph, corrector, SECOND)
-    graph.until(lambda: second.stream.loads.history.newest_ns == SECOND, "load")
+    graph.until(lambda: second.stream.loads.newest_ns == SECOND, "load")
     send_settled(graph, SECOND)
     graph.until(lambda: len(graph.heard["/second/motor_commands_corrected"]) == 2, "commands")
     message = graph.heard["/second/motor_commands_corrected"][1]

@@ -45,7 +45,7 @@ def predictor(graph, model_path):
 
 def send_load(graph, node, stamp_ns):
     graph.load(stamp_ns)
-    graph.until(lambda: node.stream.loads.history.newest_ns == stamp_ns, "load")
+    graph.until(lambda: node.stream.loads.newest_ns == stamp_ns, "load")
 
 
 def stamps(graph, topic):

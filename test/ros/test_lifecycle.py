@@ -58,7 +58,7 @@ class Corrector:
 
     def load(self, newtons=-3.0):
         self.graph.load(self.stamp_ns, (0, 0, newtons, 0, 0, 0))
-        history = self.node.stream.loads.history
+        history = self.node.stream.loads
         self.graph.until(lambda: history.newest_ns == self.stamp_ns, "load")
 
     def send(self, newtons=-3.0):
@@ -191,7 +191,7 @@ def test_a_tare_outlives_its_node_for_a_while(graph, tmp_path):
     status, values = graph.status("pose_error_predictor", lambda status, values: True)
     assert (status.level, status.message, values["tared"]) == (status.WARN, "not tared", "no")
     graph.load(SECOND, (0, 0, -2.0, 0, 0, 0))
-    graph.until(lambda: node.stream.loads.history.newest_ns, "load")
+    graph.until(lambda: node.stream.loads.newest_ns, "load")
     assert graph.call(Trigger, "/pose_error_predictor/tare", Trigger.Request()).success
     zero = node.stream.loads.zero.load.wrench
     (kept,) = tmp_path.iterdir()
@@ -231,7 +231,7 @@ def test_all_nodes_change_or_none(graph, model, tmp_path):
     assert "nothing has changed" in refused.message
     assert "model_monitor: refused: no load estimate has arrived" in refused.message
     graph.load(SECOND, (0, 0, -2.0, 0, 0, 0))
-    graph.until(lambda: all(node.stream.loads.history.newest_ns for node in nodes), "loads")
+    graph.until(lambda: all(node.stream.loads.newest_ns for node in nodes), "loads")
     assert ask("enable", SetBool, data=True).success
     assert nodes[0].stream.enabled
     assert ask("tare").success

@@ -84,7 +84,7 @@ class Player:
         streams = [node.stream for node in self.nodes]
         if topic == "/load_estimate":
             stamp_ns = nanoseconds(message.header.stamp)
-            return all(stream.loads.history.newest_ns == stamp_ns for stream in streams)
+            return all(stream.loads.newest_ns == stamp_ns for stream in streams)
         if topic == HUMIDITY:
             held = [stream.covariates.at(self.now_ns).get("humidity") for stream in streams]
             return held == [message.data] * 2

@@ -72,7 +72,7 @@ def test_the_predictor_draws_at_its_rate(graph, model_path):
     graph.listen(MarkerArray, "/wrist_markers")
     graph.connected("/wrist_markers")
     graph.load(SECOND)
-    graph.until(lambda: node.stream.loads.history.newest_ns == SECOND, "load")
+    graph.until(lambda: node.stream.loads.newest_ns == SECOND, "load")
     for i in range(50):
         graph.joints("/joint_states", SECOND + i * SECOND // 100)
     graph.until(lambda: len(graph.heard["/wrist_markers"]) == 5, "five pictures")

@@ -31,7 +31,7 @@ def add_monitor(graph, model_path, **parameters):
         graph.connected(topic)
     graph.load(SECOND, DOWN)
     graph.joints("/joint_states", SECOND, THETA)
-    graph.until(lambda: node.stream.loads.history.newest_ns == SECOND, "load")
+    graph.until(lambda: node.stream.loads.newest_ns == SECOND, "load")
     return node
 
 

@@ -45,7 +45,7 @@ def wait_for_predictions(graph, count):
 
 
 def wait_for_load(graph, predictor, stamp_ns):
-    graph.until(lambda: predictor.stream.loads.history.newest_ns == stamp_ns, "load")
+    graph.until(lambda: predictor.stream.loads.newest_ns == stamp_ns, "load")
 
 
 def numbers(message):
@@ -138,7 +138,7 @@ BAD_LOADS = {
 def test_a_bad_load_gives_no_prediction_and_a_reason(graph, predictor, wrench, frame, reason, then):
     graph.load(SECOND, wrench, frame)
     graph.until(
-        lambda: len(predictor.stream.loads.history) or predictor.health.faults, "answer to the load"
+        lambda: len(predictor.stream.loads) or predictor.health.faults, "answer to the load"
     )
     graph.joints("/joint_states", SECOND + 1)
     graph.status(NAME, lambda status, values: f"refused {reason}" in values)

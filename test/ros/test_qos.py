@@ -100,7 +100,7 @@ def test_the_alarm_reaches_a_listener_that_comes_later(graph, model_path, model)
     poses = publisher(graph, PoseStamped, "/platform_pose_measured", RELIABLE)
     load.publish(wrench_message(SECOND, "wrist_base", DOWN))
     joints.publish(joint_message(SECOND, "", NAMES, THETA))
-    graph.until(lambda: node.stream.loads.history.newest_ns == SECOND, "load")
+    graph.until(lambda: node.stream.loads.newest_ns == SECOND, "load")
     prediction = model.predict(THETA, Load(DOWN))
     rotation, shift = prediction.motion
     for i in range(40):

@@ -133,9 +133,9 @@ def test_the_load_is_the_one_that_the_nodes_would_use():
     # The nodes' history forgets all where the clock jumps back: this test is not about that.
     stamps = np.sort(stamps)
     wrenches = rng.standard_normal((30, 6))
-    history = LoadHistory(0.25)
+    history = LoadHistory(0.25, Frames())
     for stamp, wrench in zip(stamps.tolist(), wrenches, strict=True):
-        history.add(stamp, Load(wrench))
+        history.keep(stamp, Load(wrench))
     signal = in_order(stamps, wrenches)
     asked = np.sort(np.append(rng.integers(1, 60 * SECOND // 10, 200), stamps))
     newest = signal.newest(asked)

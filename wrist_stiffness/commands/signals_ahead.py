@@ -95,8 +95,7 @@ class SignalsAhead:
         ]
         together = np.concatenate([np.empty(0, dtype=np.int64), *stamps])
         return (not slow or self._slow_rise(end_ns, first_ns)) and all(
-            stream.loads.history.rises_with(together)
-            and stream.loads.history.keeps(together, first_ns)
+            stream.loads.rises_with(together) and stream.loads.keeps(together, first_ns)
             for stream in self._streams
         )
 

@@ -36,18 +36,23 @@ class Zero:
 
 
 class LoadHistory:
-    """Loads by stamp: to a joint state belongs the newest load that is not younger.
+    """Loads at O by stamp: to a joint state belongs the newest load that is not younger.
 
     Stamps alone decide, never arrival, so live nodes and replay agree wherever the load had
-    arrived.  Loads are held up to an age limit and never extrapolated.
+    arrived.  Loads are held up to an age limit and never extrapolated.  They are kept as they come
+    and given out less the tare.
 
-    `age_limit_s`: oldest load that is still used [s]; may be changed.
+    `age_limit_s`: oldest load that is still used [s]; `frames`: in which they arrive; both may be
+    changed.
     """
 
     CAPACITY = 4096
 
-    def __init__(self, age_limit_s: float) -> None:
+    def __init__(self, age_limit_s: float, frames: Frames) -> None:
         self.age_limit_s = age_limit_s
+        self.frames = frames
+        # what is subtracted; may be set to one that was measured or stored
+        self.zero: Zero | None = None
         # loads that arrived after a joint state had been served that they belonged to: where live
         # and replayed predictions may differ
         self.late = 0
@@ -71,7 +76,13 @@ class LoadHistory:
         """Newest stamp [ns], None where no load has arrived."""
         return self._stamps[-1] if self._stamps else None
 
-    def add(self, stamp_ns: int, load: Load) -> None:
+    def add(
+        self, stamp_ns: int, frame_id: str, force: Sequence[float], moment: Sequence[float]
+    ) -> None:
+        """Take in a wrench message (see `Frames.load` for its errors)."""
+        self.keep(stamp_ns, self.frames.load(frame_id, force, moment))
+
+    def keep(self, stamp_ns: int, load: Load) -> None:
         """Keep a load; one with the same stamp is replaced, one out of order finds its place.
 
         A stamp that is older than the newest one by more than the age limit says that the clock
@@ -110,13 +121,19 @@ class LoadHistory:
 
     def _load(self, place: int) -> Load:
         row = self._first + place
-        return Load(self._wrench[row].copy(), bool(self._on_platform[row]))
+        wrench, on_platform = self._wrench[row], bool(self._on_platform[row])
+        if self.zero is None:
+            return Load(wrench.copy(), on_platform)
+        if self.zero.load.on_platform != on_platform:
+            raise InputError("load: the tare was taken in another frame than this load")
+        return Load(wrench - self.zero.load.wrench, on_platform)
 
     def at(self, stamp_ns: int) -> tuple[int, Load]:
         """Return stamp and load that belong to a joint state.
 
         `stamp_ns`: stamp of the joint state [ns].  Gives stamp [ns] and load.  Raises
-        `StaleLoadError` if there is none, or it is older than the age limit.
+        `StaleLoadError` if there is none, or it is older than the age limit; `InputError` if the
+        tare was taken in another frame.
         """
         if stamp_ns == 0:
             raise StaleLoadError("the sample has no stamp (zero), so no load belongs to it")
@@ -162,7 +179,7 @@ class LoadHistory:
     def block_at(self, stamps: NDArray[np.int64]) -> tuple[Array, Flags, Flags]:
         """Return the loads (n, 6) that belong to stamps (n,) [ns], which are in U, which are there.
 
-        Those that `at` refuses are zero.
+        Those that `at` refuses are not there.
         """
         kept = np.array(self._stamps, dtype=np.int64)
         found = np.searchsorted(kept, stamps, side="right") - 1
@@ -175,19 +192,22 @@ class LoadHistory:
             self._served_ns = int(kept[found[last]]), newest
             rows = self._first + found[known]
             wrench[known], on_platform[known] = self._wrench[rows], self._on_platform[rows]
+        if self.zero is not None:
+            known &= on_platform == self.zero.load.on_platform
+            wrench[known] -= self.zero.load.wrench
         return wrench, on_platform, known
 
-    def mean_since(self, window_s: float, limit: Thresholds) -> Zero:
-        """Return mean and scatter of the newest loads over a window, for the tare.
+    def measured_zero(self, limit: Thresholds) -> Zero:
+        """Return mean and scatter of the loads of the last second, for a tare.
 
-        `window_s`: up to the newest stamp [s]; `limit`: by which another load departs.  Gives
-        `Zero`: in the frame in which they came.  Raises `StaleLoadError` if there is no load;
-        `InputError` if loads in F and in U are mixed, or the load moves.
+        `limit`: by which another load departs.  Gives `Zero`: in the frame in which they came.
+        Raises `StaleLoadError` if there is no load; `InputError` if loads in F and in U are mixed,
+        or the load moves.
         """
         if not self._stamps:
             raise StaleLoadError("tare: no load estimate has arrived")
         last_ns = self._stamps[-1]
-        start = bisect.bisect_left(self._stamps, last_ns - round(window_s * NANOSECONDS))
+        start = bisect.bisect_left(self._stamps, last_ns - round(TARE_WINDOW_S * NANOSECONDS))
         rows = slice(self._first + start, self._first + len(self._stamps))
         wrenches, on_platform = self._wrench[rows], self._on_platform[rows]
         if on_platform.any() != on_platform.all():
@@ -198,39 +218,15 @@ class LoadHistory:
         if force > limit.force or moment > limit.moment:
             raise InputError(
                 f"tare: the load moves by {force:.3g} N and {moment:.3g} N m within "
-                f"{window_s:g} s (limits {limit.force:g} N, {limit.moment:g} N m); let it rest"
+                f"{TARE_WINDOW_S:g} s (limits {limit.force:g} N, {limit.moment:g} N m); let it rest"
             )
         return Zero(Load(mean, bool(on_platform[0])), wrenches.std(axis=0))
 
     def since(self, start_ns: int, stamp_ns: int) -> list[tuple[int, Load]]:
-        """Return stamps [ns] and loads after one stamp and up to another."""
+        """Return stamps [ns] and loads after one stamp and up to another (errors as of `at`)."""
         first = bisect.bisect_right(self._stamps, start_ns)
         last = bisect.bisect_right(self._stamps, stamp_ns)
         return [(self._stamps[place], self._load(place)) for place in range(first, last)]
-
-
-class LoadIntake:
-    """Loads as they arrive, moved to O, less the tare.
-
-    `frames`: frames in which loads arrive; may be changed.  `age_limit_s`: oldest load that is
-    still used [s].
-    """
-
-    def __init__(self, frames: Frames, age_limit_s: float) -> None:
-        self.frames = frames
-        self.history = LoadHistory(age_limit_s)  # untared loads by stamp
-        # what is subtracted; may be set to one that was measured or stored
-        self.zero: Zero | None = None
-
-    def add(
-        self, stamp_ns: int, frame_id: str, force: Sequence[float], moment: Sequence[float]
-    ) -> None:
-        """Take in a wrench message (see `Frames.load` for its errors)."""
-        self.history.add(stamp_ns, self.frames.load(frame_id, force, moment))
-
-    def measured_zero(self, limit: Thresholds) -> Zero:
-        """Return the mean of the last second, for a tare (see `LoadHistory.mean_since`)."""
-        return self.history.mean_since(TARE_WINDOW_S, limit)
 
     def add_block(
         self, stamps: NDArray[np.int64], frame_id: str, wrenches: NDArray[np.float64]
@@ -240,8 +236,8 @@ class LoadIntake:
         `stamps` (k,) int [ns]; `wrenches` (k, 6): force and moment [N, N m].
         """
         finite = bool(np.isfinite(wrenches).all())
-        if finite and self.history.rises_with(stamps) and self.frames.is_at_origin(frame_id):
-            self.history.extend(stamps, wrenches, self.frames.turns(frame_id))
+        if finite and self.rises_with(stamps) and self.frames.is_at_origin(frame_id):
+            self.extend(stamps, wrenches, self.frames.turns(frame_id))
             return []
         faults: list[WristError] = []
         for stamp_ns, wrench in zip(stamps.tolist(), wrenches.tolist(), strict=True):
@@ -250,37 +246,6 @@ class LoadIntake:
             except WristError as error:
                 faults.append(error)
         return faults
-
-    def block_at(self, stamps: NDArray[np.int64]) -> tuple[Array, Flags, Flags]:
-        """Return the tared loads that belong to n stamps [ns] (see `LoadHistory.block_at`)."""
-        wrench, on_platform, known = self.history.block_at(stamps)
-        if self.zero is not None:
-            zero = self.zero.load
-            known &= on_platform == zero.on_platform
-            wrench[known] -= zero.wrench
-        return wrench, on_platform, known
-
-    def at(self, stamp_ns: int) -> tuple[int, Load]:
-        """Return stamp [ns] and load that belong to a joint state (see `LoadHistory.at`).
-
-        Raises `InputError` if there is none that is young enough, or the tare was taken in another
-        frame.
-        """
-        load_stamp_ns, load = self.history.at(stamp_ns)
-        return load_stamp_ns, self._tared(load)
-
-    def since(self, start_ns: int, stamp_ns: int) -> list[tuple[int, Load]]:
-        """Return stamps [ns] and loads after one stamp and up to another (errors as of `at`)."""
-        found = self.history.since(start_ns, stamp_ns)
-        return [(stamp_ns, self._tared(load)) for stamp_ns, load in found]
-
-    def _tared(self, load: Load) -> Load:
-        if self.zero is None:
-            return load
-        zero = self.zero.load
-        if zero.on_platform != load.on_platform:
-            raise InputError("load: the tare was taken in another frame than this load")
-        return Load(load.wrench - zero.wrench, load.on_platform)
 
 
 def _moved(departures: Array, part: NDArray[np.int_]) -> tuple[float, float]:

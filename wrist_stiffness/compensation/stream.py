@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.held_signals import HeldSignals
 from wrist_stiffness.compensation.intake import Frames, StaticTransform, sensor_frames
-from wrist_stiffness.compensation.load_history import LoadIntake, Zero
+from wrist_stiffness.compensation.load_history import LoadHistory, Zero
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError, WristError
@@ -33,7 +33,9 @@ class Stream:
     """
 
     def __init__(self, model: ErrorModel | None, settings: StreamSettings) -> None:
-        self.loads = LoadIntake(settings.frames, settings.load_age_limit_s)  # loads by stamp, tared
+        self.loads = LoadHistory(
+            settings.load_age_limit_s, settings.frames
+        )  # loads by stamp, tared
         # by component or `ambient` [degC]
         self.temperatures = HeldSignals(settings.signal_age_limit_s)
         self.covariates = HeldSignals(settings.signal_age_limit_s)  # by name, in their own units
@@ -68,7 +70,7 @@ class Stream:
     def settings(self, settings: StreamSettings) -> None:
         self._settings = settings
         self._use_frames()
-        self.loads.history.age_limit_s = settings.load_age_limit_s
+        self.loads.age_limit_s = settings.load_age_limit_s
         self.temperatures.age_limit_s = settings.signal_age_limit_s
         self.covariates.age_limit_s = settings.signal_age_limit_s
 
@@ -93,7 +95,7 @@ class Stream:
         return tuple(f"{name}: older than {limit_s:g} s, not used" for name in names)
 
     def use_zero(self, zero: Zero | None) -> None:
-        """Tare: take a zero off every load (see `LoadIntake.measured_zero`)."""
+        """Tare: take a zero off every load (see `LoadHistory.measured_zero`)."""
         self.loads.zero = zero
 
     def running_model(self) -> RunningModel:

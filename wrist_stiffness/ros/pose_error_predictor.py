@@ -142,7 +142,7 @@ class PoseErrorPredictor(WristNode):
 
     def after_load(self) -> None:
         """Predict for the joint states that need not wait any longer."""
-        for joints in self.waiting.ready(self.stream.loads.history.newest_ns):
+        for joints in self.waiting.ready(self.stream.loads.newest_ns):
             try:
                 self._predict(joints)
             except WristError as error:

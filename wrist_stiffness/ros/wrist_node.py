@@ -304,7 +304,7 @@ class WristNode(GuardedNode, ABC):
         self._diagnostics.publish(message)
 
     def _facts(self) -> dict[str, str]:
-        newest_ns = self.stream.loads.history.newest_ns
+        newest_ns = self.stream.loads.newest_ns
         age_ns = None if newest_ns is None else self.get_clock().now().nanoseconds - newest_ns
         tare = self._tare
         return {
@@ -313,7 +313,7 @@ class WristNode(GuardedNode, ABC):
             "tared": "no" if tare is None else f"{time.time() - tare.time_s:.0f} s ago",
             "tare [N, N m]": "" if tare is None else str(tare.zero.load.wrench.round(4).tolist()),
             "age of the load [s]": "" if age_ns is None else f"{age_ns / NANOSECONDS:.3f}",
-            "loads that came late": str(self.stream.loads.history.late),
+            "loads that came late": str(self.stream.loads.late),
             **self.facts(),
         }
 
