@@ -18,8 +18,7 @@ from wrist_stiffness.compensation.parameters import (
     CORRECTION,
     PREDICTION,
     ParameterEntry,
-    correction_settings,
-    prediction_settings,
+    stream_settings,
 )
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
@@ -50,7 +49,7 @@ def node_settings(
     names = dict(zip(("motor_1_joint", "motor_2_joint"), joints, strict=False))
     predictor = _values(nodes, PREDICTOR, (*COMMON, *PREDICTION))
     corrector = _values(nodes, CORRECTOR, (*COMMON, *CORRECTION))
-    return prediction_settings(predictor | names), correction_settings(corrector | names)
+    return stream_settings(predictor | names), stream_settings(corrector | names)
 
 
 def _values(

@@ -244,12 +244,15 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
 
 
 def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
-    """Return the settings of the sample path of a node that does not correct.
+    """Return the settings of the sample path, in SI units.
 
-    `values`: parameters of `COMMON` by name.  Gives `StreamSettings`: in SI units, its corrections'
-    part at the defaults.  Raises `InputError` if both motors have the same name or the frames
-    cannot be read.
+    `values`: parameters of `COMMON`, `PREDICTION` and `CORRECTION` by name; those that a node does
+    not have are at their defaults.  Raises `InputError` if both motors have the same name, the
+    frames cannot be read or a text is not among its choices.
     """
+    entries = (*COMMON, *PREDICTION, *CORRECTION)
+    values = {entry.name: entry.default for entry in entries} | dict(values)
+    check_choices(entries, values)
     if values["motor_1_joint"] == values["motor_2_joint"]:
         raise InputError(f"motor_1_joint, motor_2_joint: both are {values['motor_1_joint']!r}")
     for name in values["covariates"].split():
@@ -261,33 +264,15 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
     prefix = checked_prefix(values["frame_prefix"])
     sensors = frames_from_yaml(values["frames"]).sensors
     own = {name.removeprefix(prefix): sensor for name, sensor in sensors.items()}
+    noise = np.repeat([values["load_force_noise_n"], values["load_moment_noise_nm"]], 3)
     return StreamSettings(
         motors=MotorNames(values["motor_1_joint"], values["motor_2_joint"]),
         frames=Frames(own, prefix),
         load_age_limit_s=values["load_age_limit_s"],
         signal_age_limit_s=values["signal_age_limit_s"],
-    )
-
-
-def prediction_settings(values: Mapping[str, Any]) -> StreamSettings:
-    """Return the same of the predictor, from the parameters `COMMON` and `PREDICTION`."""
-    noise = np.repeat([values["load_force_noise_n"], values["load_moment_noise_nm"]], 3)
-    return replace(
-        stream_settings(values),
         load_noise=noise if noise.any() else None,
         marker_rate_hz=values["marker_rate_hz"],
         marker_exaggeration=values["marker_exaggeration"],
-    )
-
-
-def correction_settings(values: Mapping[str, Any]) -> StreamSettings:
-    """Return the same of a node that corrects, from the parameters `COMMON` and `CORRECTION`.
-
-    Raises `InputError` as `stream_settings`, and if a text is not among its choices.
-    """
-    check_choices(CORRECTION, values)
-    return replace(
-        stream_settings(values),
         objective=values["objective"],
         correction_limit=radians(values["correction_limit_deg"]),
         safety=SafetySettings(

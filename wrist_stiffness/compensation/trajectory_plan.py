@@ -95,23 +95,20 @@ def corrected_point(
     """
     at = list(places)
     there, beside = corrected[0], iter(corrected[1:])
+    slopes, bends = np.zeros((2, 2)), np.zeros((2, 2))
+    for i, derivative in enumerate((point.velocities, point.accelerations)):
+        if len(derivative) and derivative[at].any():
+            size = float(np.hypot(*derivative[at]))
+            after, before = next(beside), next(beside)
+            slopes[i] = (after - before) * (0.5 * size / STEP)
+            bends[i] = (after - 2.0 * there + before) * (size / STEP) ** 2
     positions = point.positions.copy()
     positions[at] = there
     velocities, accelerations = point.velocities.copy(), point.accelerations.copy()
-    if len(velocities) and velocities[at].any():
-        size = float(np.hypot(*velocities[at]))
-        after, before = next(beside), next(beside)
-        velocities[at] = (after - before) * (0.5 * size / STEP)
-        curvature = (after - 2.0 * there + before) * (size / STEP) ** 2
-    else:
-        curvature = np.zeros(2)
+    if len(velocities):
+        velocities[at] = slopes[0]
     if len(accelerations):
-        along = np.zeros(2)
-        if accelerations[at].any():
-            size = float(np.hypot(*accelerations[at]))
-            after, before = next(beside), next(beside)
-            along = (after - before) * (0.5 * size / STEP)
-        accelerations[at] = along + curvature
+        accelerations[at] = slopes[1] + bends[0]
     return replace(point, positions=positions, velocities=velocities, accelerations=accelerations)
 
 

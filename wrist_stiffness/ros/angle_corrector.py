@@ -15,7 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
-from wrist_stiffness.compensation.parameters import CORRECTION, PASS_THROUGH, correction_settings
+from wrist_stiffness.compensation.parameters import CORRECTION, PASS_THROUGH
 from wrist_stiffness.compensation.payload import Payload
 from wrist_stiffness.compensation.safety import require_fresh
 from wrist_stiffness.compensation.settings import StreamSettings
@@ -57,7 +57,6 @@ class AngleCorrector(WristNode):
     """
 
     stream: CorrectionStream
-    settings_of = staticmethod(correction_settings)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("angle_corrector", CORRECTION, **options)

@@ -16,7 +16,7 @@ from visualization_msgs.msg import MarkerArray
 
 from wrist_stiffness.commands.wrist_drawing import Pace, drawing_of
 from wrist_stiffness.compensation.load_history import NANOSECONDS
-from wrist_stiffness.compensation.parameters import PREDICTION, prediction_settings
+from wrist_stiffness.compensation.parameters import PREDICTION
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
@@ -93,7 +93,6 @@ class PoseErrorPredictor(WristNode):
     """Publishes `/pose_error_predicted`; nothing for a sample that cannot be predicted."""
 
     stream: PredictionStream
-    settings_of = staticmethod(prediction_settings)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("pose_error_predictor", PREDICTION, **options)

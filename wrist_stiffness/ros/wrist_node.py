@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -62,14 +62,12 @@ class WristNode(GuardedNode, ABC):
     """
 
     stream: Stream
-    settings_of: Callable[[Mapping[str, Any]], StreamSettings] = staticmethod(stream_settings)
-    """Checks parameters and returns the settings that they stand for (may raise InputError)."""
 
     def __init__(self, name: str, entries: Sequence[ParameterEntry], **options: Any) -> None:
         super().__init__(name, **options)
         self._entries = (*COMMON, *entries)
         declare(self, self._entries)
-        self.stream = self.make_stream(self.settings_of(values_of(self, self._entries)))
+        self.stream = self.make_stream(stream_settings(values_of(self, self._entries)))
         self.base_frame = self.stream.settings.frames.prefix + BASE_FRAME  # name of F on topics
         # effects that the model left out of its last prediction, and why
         self.left_out: tuple[str, ...] = ()
@@ -252,14 +250,14 @@ class WristNode(GuardedNode, ABC):
     def _check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         values = {**values_of(self, self._entries), **{p.name: p.value for p in changes}}
         try:
-            self.settings_of(values)
+            stream_settings(values)
         except Exception as error:
             reason = str(error) if isinstance(error, WristError) else repr(error)
             return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
     def _use_parameters(self, changes: list[Parameter]) -> None:
-        self.stream.settings = self.settings_of(values_of(self, self._entries))
+        self.stream.settings = stream_settings(values_of(self, self._entries))
 
     def _loading(self) -> Loading:
         path = model_path(self.get_parameter("model_file").value)
