@@ -20,7 +20,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.ros import model_loading
+from wrist_stiffness.ros import wrist_node
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, nanoseconds, time_message
 from wrist_stiffness.ros.pose_error_predictor import PoseErrorPredictor
@@ -64,7 +64,7 @@ def test_the_output_has_no_gap_while_a_model_is_loaded(graph, predictor, monkeyp
         assert released.wait(DEADLINE_S)
         return load_model(path)
 
-    monkeypatch.setattr(model_loading, "load_model", slow)
+    monkeypatch.setattr(wrist_node, "load_model", slow)
     client = graph.probe.create_client(Trigger, f"/{PREDICTOR}/reload_model")
     graph.until(client.service_is_ready, "service")
     answer, before = client.call_async(Trigger.Request()), predictor.stream.model

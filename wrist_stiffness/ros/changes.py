@@ -30,35 +30,6 @@ class Change:
     make: Callable[[], Callable[[], None]]  # makes the change; returns what undoes it
 
 
-class PreparedChange:
-    """The change of one node between its two steps."""
-
-    def __init__(self) -> None:
-        self._change: Change | None = None
-        self._undo: Callable[[], None] | None = None
-
-    def prepare(self, change: Change) -> str:
-        """Keep a change until it is committed, instead of any other."""
-        self._change, self._undo = change, None
-        return change.said
-
-    def commit(self, wanted: bool) -> str:
-        """Make the change that was prepared, or drop or undo it.
-
-        Raises `InputError` if nothing was prepared.
-        """
-        change, undo = self._change, self._undo
-        self._change = self._undo = None
-        if not wanted:
-            if undo is not None:
-                undo()
-            return "as before"
-        if change is None:
-            raise InputError("nothing is prepared")
-        self._undo = change.make()
-        return change.said
-
-
 class Turn:
     """Awaited, gives the executor's other callbacks a turn."""
 

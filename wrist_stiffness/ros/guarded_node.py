@@ -16,8 +16,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool
 
-from wrist_stiffness.errors import WristError
-from wrist_stiffness.ros.changes import COMMIT, PREPARE, Change, Prepare, PreparedChange
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.ros.changes import COMMIT, PREPARE, Change, Prepare
 from wrist_stiffness.ros.executor import DataGroup
 from wrist_stiffness.ros.qos import RELIABLE_QOS
 from wrist_stiffness.topics import relative
@@ -112,10 +112,11 @@ class GuardedNode(LifecycleNode):
         self._data_group = DataGroup()
         # Services may wait for each other, those of this node included.
         self._service_group = ReentrantCallbackGroup()
-        self._prepared = PreparedChange()
+        self._prepared: Change | None = None  # between its two steps
+        self._undo: Callable[[], None] | None = None
         for service in self.services:
             service.callback = self._answering(service.callback)
-        self.serve(SetBool, f"~/{COMMIT}", lambda request: self._prepared.commit(request.data))
+        self.serve(SetBool, f"~/{COMMIT}", lambda request: self._commit(request.data))
 
     @property
     def state(self) -> str:
@@ -205,10 +206,25 @@ class GuardedNode(LifecycleNode):
             return change.said
 
         async def first_step(request: Any) -> str:
-            return self._prepared.prepare(await prepared(request))
+            # Instead of any other.
+            self._prepared, self._undo = await prepared(request), None
+            return self._prepared.said
 
         self.serve(service_type, f"~/{action}", at_once)
         self.serve(service_type, f"~/{action}/{PREPARE}", first_step)
+
+    def _commit(self, wanted: bool) -> str:
+        """Make the change that was prepared, or drop or undo it."""
+        change, undo = self._prepared, self._undo
+        self._prepared = self._undo = None
+        if not wanted:
+            if undo is not None:
+                undo()
+            return "as before"
+        if change is None:
+            raise InputError("nothing is prepared")
+        self._undo = change.make()
+        return change.said
 
     def on_fault(self, error: Exception) -> None:
         """Count what a callback raised, log it, at most every five seconds, and go on."""

@@ -5,9 +5,14 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from concurrent.futures import wait as wait_for
 from functools import partial
+from pathlib import Path
+from threading import Thread
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TransformStamped, WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
@@ -23,7 +28,9 @@ from wrist_stiffness.compensation.parameters import COMMON, ParameterEntry, stre
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import InputError, WristError
-from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.error_model import ErrorModel, Load
+from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.python_laws import python_laws
 from wrist_stiffness.ros.changes import Change, until
 from wrist_stiffness.ros.conversions import nanoseconds, transforms_type
 from wrist_stiffness.ros.guarded_node import (
@@ -34,7 +41,6 @@ from wrist_stiffness.ros.guarded_node import (
     GuardedNode,
 )
 from wrist_stiffness.ros.kept_tare import KeptTare, Tare
-from wrist_stiffness.ros.model_loading import Loading
 from wrist_stiffness.ros.parameters import declare, model_path, values_of
 from wrist_stiffness.ros.qos import RELIABLE_QOS, SENSOR_QOS, STATE_QOS, STATIC_QOS
 from wrist_stiffness.ros.stream_messages import WrenchSample, wrench_reader
@@ -49,6 +55,58 @@ from wrist_stiffness.topics import (
 )
 
 REPORT_EVERY_S = 1.0
+
+LOOK_EVERY_S = 0.1
+
+
+class Loading:
+    """One model on its way, in a thread that dies with the process: no file may hold the node up.
+
+    `limit_s`: longest time that may take [s]; `allow_python_laws`: run the Python files that the
+    model names.
+    """
+
+    def __init__(self, path: Path, limit_s: float, allow_python_laws: bool) -> None:
+        self.limit_s = limit_s
+        self._path, self._allowed = path, allow_python_laws
+        self._model: Future[ErrorModel] = Future()
+        Thread(target=self._load, daemon=True).start()
+
+    @property
+    def done(self) -> bool:
+        """Whether the model is there, or why it is not."""
+        return self._model.done()
+
+    def wait(self, go_on: Callable[[], bool]) -> None:
+        """Wait until it is done, or for as long as it may take and the node is to go on."""
+        end = time.monotonic() + self.limit_s
+        while not self.done and go_on() and time.monotonic() < end:
+            wait_for([self._model], LOOK_EVERY_S)
+
+    def result(self) -> ErrorModel:
+        """Return the model (WristError if it cannot be loaded, whatever the reason)."""
+        if not self.done:
+            raise InputError(f"{self._path}: not loaded within {self.limit_s:g} s; given up")
+        return self._model.result()
+
+    def _load(self) -> None:
+        try:
+            if self._path.exists() and not self._path.is_file():
+                raise InputError(f"{self._path}: is no regular file")
+            with python_laws(self._allowed):
+                model = load_model(self._path)
+            # The first prediction fills what is computed once.
+            model.predict(np.zeros(2), Load(np.zeros(6)))
+            self._model.set_result(model)
+        except WristError as error:
+            self._model.set_exception(error)
+        except SystemExit:
+            ending = InputError(f"{self._path}: the law of the model ends the program")
+            self._model.set_exception(ending)
+        except BaseException as error:
+            # A model file may name a law of the user's own, which is code.
+            text = f"{self._path}: {type(error).__name__}: {error}"
+            self._model.set_exception(InputError(text))
 
 
 class WristNode(GuardedNode, ABC):
