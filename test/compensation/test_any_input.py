@@ -105,7 +105,9 @@ def answers_of(model, messages):
     plain = StreamSettings()
     predicting = PredictionStream(model, plain)
     correcting = CorrectionStream(model, plain, enabled=True)
-    monitoring = MonitorStream(model, plain, MonitorSettings(np.full(6, 1e-6)), 0.5, 1.0)
+    monitoring = MonitorStream(
+        model, plain, MonitorSettings(np.full(6, 1e-6), joint_age_limit_s=0.5)
+    )
     answers = Counter()
 
     def came(kind, *numbers):

@@ -184,7 +184,9 @@ SPEEDS = {
 def test_speeds_are_used_where_given_and_else_differences(model, speedy, names, speeds, wanted):
     predicting = PredictionStream(speedy, StreamSettings())
     correcting = CorrectionStream(speedy, replace(AT_ONCE, objective="tool_point"), enabled=False)
-    monitoring = MonitorStream(speedy, StreamSettings(), MonitorSettings(np.ones(6)), 1.0, 1.0)
+    monitoring = MonitorStream(
+        speedy, StreamSettings(), MonitorSettings(np.ones(6), joint_age_limit_s=1.0)
+    )
     plain = model.predict(np.array([0.01, 0.0]), Load(DOWN))
     rotation, shift = plain.motion
     quaternion = Rotation.from_matrix(rotation @ plain.configuration.platform).as_quat()

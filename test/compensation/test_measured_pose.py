@@ -27,7 +27,9 @@ TRACKER = Frames(
 @pytest.fixture
 def stream(model):
     stream = MonitorStream(
-        model, StreamSettings(frames=TRACKER), MonitorSettings(np.full(6, 1e-6)), 1.0, 1.0
+        model,
+        StreamSettings(frames=TRACKER),
+        MonitorSettings(np.full(6, 1e-6), joint_age_limit_s=1.0),
     )
     stream.loads.add(SECOND, "wrist_base", DOWN[:3], DOWN[3:])
     stream.on_joint_state(SECOND, NAMES, THETA)

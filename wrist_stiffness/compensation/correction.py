@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrist_stiffness.compensation.objective import DEPENDENT, OBJECTIVES, Objective
+from wrist_stiffness.compensation.objective import Objective
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.compiled import CorrectedRows
 from wrist_stiffness.mechanism.components import Array
@@ -102,16 +102,6 @@ def _step(missing: float, last_missing: float, last_step: float, play: float) ->
     if beyond and abs(missing - last_missing) < ANSWERS * abs(last_step):
         return -copysign(max(abs(missing), 2.0 * abs(last_step)), missing)
     return -beyond
-
-
-def compiled_task(objective: Objective, play: float) -> Array:
-    """Return an objective as the compiled search takes it, (10,).
-
-    `play`: what a motor may leave before its correction moves [rad].
-    """
-    vector = objective.tool_point if objective.name == "tool_point" else objective.normal
-    search = [TOLERANCE, UNCHECKED, ANSWERS, DEPENDENT, MAX_ITERATIONS]
-    return np.array([*search, OBJECTIVES.index(objective.name), *vector, play])
 
 
 def correction_of(found: CorrectedRows, place: int, model: ErrorModel, load: Load) -> Correction:

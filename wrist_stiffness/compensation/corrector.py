@@ -13,12 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from wrist_stiffness.compensation.correction import (
+    ANSWERS,
+    MAX_ITERATIONS,
+    TOLERANCE,
+    UNCHECKED,
     Correction,
     as_applied,
-    compiled_task,
     correct,
 )
-from wrist_stiffness.compensation.objective import Objective
+from wrist_stiffness.compensation.objective import DEPENDENT, OBJECTIVES, Objective
 from wrist_stiffness.compensation.running_model import RunningModel
 from wrist_stiffness.compensation.safety import AppliedCorrection, guard_weight
 from wrist_stiffness.compensation.settings import StreamSettings
@@ -66,8 +69,11 @@ class Corrector:
         if self._settings_of is None or not (
             self._settings_of[0] is settings and self._settings_of[1] is model
         ):
-            task = compiled_task(objective_of(model, settings), play_of(model, settings))
-            self._task = np.append(task, settings.correction_limit)
+            own = objective_of(model, settings)
+            search = TOLERANCE, UNCHECKED, ANSWERS, DEPENDENT, MAX_ITERATIONS
+            vector = own.tool_point if own.name == "tool_point" else own.normal
+            limits = play_of(model, settings), settings.correction_limit
+            self._task = np.array([*search, OBJECTIVES.index(own.name), *vector, *limits])
             self._safety = settings.safety.compiled(model.table.geometry.limits)
             self._settings_of = settings, model
         return self._task, self._safety

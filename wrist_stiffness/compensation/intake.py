@@ -130,6 +130,7 @@ class SensorFrame:
 
 IN_BASE = SensorFrame(BASE_FRAME)
 ON_PLATFORM = SensorFrame(PLATFORM_FRAME)
+FIXED = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: ON_PLATFORM}
 
 
 @dataclass(frozen=True)
@@ -151,11 +152,9 @@ class Frames:
         [N], [N m].  Gives `Load`: at O, in F or U.  Raises `FrameError` if the frame is neither
         known nor mapped; `InputError` if a component is not finite.
         """
-        known = {BASE_FRAME: IN_BASE, PLATFORM_FRAME: ON_PLATFORM}
-        name = self.own_name(frame_id)
-        frame = self.sensors.get(name) or known.get(name)
+        frame = self._frame(frame_id)
         if frame is None:
-            names = ", ".join([*known, *self.sensors])
+            names = ", ".join([*FIXED, *self.sensors])
             raise FrameError(f"load: frame '{frame_id}' is not known (known: {names})")
         components = [*map(float, force), *map(float, moment)]
         if not all(map(isfinite, components)):
@@ -168,10 +167,14 @@ class Frames:
         turned_moment = sign * (frame.rotation @ wrench[3:]) + cross(frame.position, turned_force)
         return Load(np.concatenate([turned_force, turned_moment]), frame.parent == PLATFORM_FRAME)
 
+    def _frame(self, frame_id: str) -> SensorFrame | None:
+        name = self.own_name(frame_id)
+        return self.sensors.get(name) or FIXED.get(name)
+
     def is_at_origin(self, frame_id: str) -> bool:
         """Tell whether loads of a frame are at O as they come."""
-        name = self.own_name(frame_id)
-        return name in (BASE_FRAME, PLATFORM_FRAME) and name not in self.sensors
+        frame = self._frame(frame_id)
+        return frame is IN_BASE or frame is ON_PLATFORM
 
     def turns(self, frame_id: str) -> bool:
         """Tell whether loads of a frame that is at O turn with the platform."""
@@ -184,7 +187,7 @@ class Frames:
 
         Raises `FrameError` if the frame is neither `wrist_platform` nor mapped to it.
         """
-        frame = self._mapped(frame_id, PLATFORM_FRAME, ON_PLATFORM, what)
+        frame = self._mapped(frame_id, PLATFORM_FRAME, what)
         x, y, z = (frame.rotation @ np.array(point) + frame.position).tolist()
         return x, y, z
 
@@ -195,21 +198,19 @@ class Frames:
         `rotation` (3, 3): from the frame to F, and `position` (3,): the frame's origin in F [m].
         Raises `FrameError` if the frame is neither `wrist_base` nor mapped to it.
         """
-        frame = self._mapped(frame_id, BASE_FRAME, IN_BASE, what)
+        frame = self._mapped(frame_id, BASE_FRAME, what)
         return frame.rotation, frame.position
 
-    def _mapped(self, frame_id: str, parent: str, itself: SensorFrame, what: str) -> SensorFrame:
+    def _mapped(self, frame_id: str, parent: str, what: str) -> SensorFrame:
         """Return a frame that is the parent or mapped to it (FrameError if neither)."""
-        known = {parent: itself} | {
-            own: frame for own, frame in self.sensors.items() if frame.parent == parent
-        }
-        name = self.own_name(frame_id)
-        if name not in known:
+        frame = self._frame(frame_id)
+        if frame is None or frame.parent != parent:
+            known = [parent, *(name for name, own in self.sensors.items() if own.parent == parent)]
             raise FrameError(
                 f"{what}: frame '{frame_id}' is neither {parent} nor mapped to it "
                 f"(known: {', '.join(known)})"
             )
-        return known[name]
+        return frame
 
 
 def _sensor_frame(

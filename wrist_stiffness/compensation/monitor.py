@@ -41,6 +41,9 @@ class MonitorSettings:
     # sum at which there is an alarm [standard deviations]; 15 means one false alarm in about a
     # million samples of white noise
     threshold: float = 15.0
+    # oldest joint state and oldest pose of the frame that are still matched with a pose [s]
+    joint_age_limit_s: float = 0.02
+    frame_age_limit_s: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse noise that is not positive."""

@@ -49,24 +49,17 @@ class MonitorStream(Stream):
     """Residual for every measured pose.
 
     `model`: may be replaced between samples; the baseline is then learned anew.  `monitoring`: what
-    counts as a change.  `joint_age_limit_s`, `frame_age_limit_s`: oldest joint state and oldest
-    pose of the frame that are still matched with a pose [s].
+    counts as a change.
     """
 
     def __init__(
-        self,
-        model: ErrorModel | None,
-        settings: StreamSettings,
-        monitoring: MonitorSettings,
-        joint_age_limit_s: float,
-        frame_age_limit_s: float,
+        self, model: ErrorModel | None, settings: StreamSettings, monitoring: MonitorSettings
     ) -> None:
         super().__init__(model, settings)
         self._monitoring = monitoring
-        self._joint_age_limit_s = joint_age_limit_s
         self._joints: deque[JointStateKept] = deque(maxlen=JOINT_STATES_KEPT)
         # motion of the wrist's frame, where a target on it is measured
-        self.frame = FrameMotion(frame_age_limit_s)
+        self.frame = FrameMotion(monitoring.frame_age_limit_s)
         self._judged: ErrorModel | None = None
         # statistics and alarm since the model was loaded
         self.monitor = ResidualMonitor(monitoring)
@@ -133,9 +126,8 @@ class MonitorStream(Stream):
         self, stamp_ns: int, rotation: Array, position: Array, variance: Array | None
     ) -> MonitoredPose:
         rotation, position = self.frame.taken_out(stamp_ns, rotation, position)
-        _, theta, theta_dot = newest_before(
-            self._joints, stamp_ns, self._joint_age_limit_s, "joint state"
-        )
+        limit_s = self._monitoring.joint_age_limit_s
+        _, theta, theta_dot = newest_before(self._joints, stamp_ns, limit_s, "joint state")
         running = self.running_model()
         prediction = running.advance(stamp_ns, theta, self.loads.at(stamp_ns)[1], theta_dot)
         residual = residual_of_pose(rotation, position, prediction)

@@ -240,7 +240,13 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
     """
     check_choices(MONITOR, values)
     noise = np.repeat([1e-6 * values["noise_s_um"], radians(1e-3 * values["noise_phi_mdeg"])], 3)
-    return MonitorSettings(noise, values["baseline_samples"], threshold=values["alarm_threshold"])
+    return MonitorSettings(
+        noise,
+        values["baseline_samples"],
+        threshold=values["alarm_threshold"],
+        joint_age_limit_s=values["joint_age_limit_s"],
+        frame_age_limit_s=values["frame_age_limit_s"],
+    )
 
 
 def stream_settings(values: Mapping[str, Any]) -> StreamSettings:

@@ -32,7 +32,7 @@ from wrist_stiffness.ros.conversions import (
     pose_message_stamped,
     wrench_message,
 )
-from wrist_stiffness.ros.parameters import declare, model_path
+from wrist_stiffness.ros.parameters import declare, model_path, values_of
 from wrist_stiffness.ros.qos import NOTES_QOS, RELIABLE_QOS
 from wrist_stiffness.ros.run import tell
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
@@ -103,17 +103,12 @@ PARAMETERS = (
 SENT_QUEUE = QoSProfile(depth=1)
 """Motors follow the newest command only."""
 
-ANSWERS = {
-    POSE_ERROR_PREDICTED: PoseWithCovarianceStamped,
-    MODEL_RESIDUAL: PoseWithCovarianceStamped,
-}
-"""What the wrist's nodes say of a sample, beside the corrected command."""
-
 SPEAKERS = {
-    POSE_ERROR_PREDICTED: "pose_error_predictor",
-    MODEL_RESIDUAL: "model_monitor",
-    MOTOR_COMMANDS_CORRECTED: "angle_corrector",
+    POSE_ERROR_PREDICTED: ("pose_error_predictor", PoseWithCovarianceStamped),
+    MODEL_RESIDUAL: ("model_monitor", PoseWithCovarianceStamped),
+    MOTOR_COMMANDS_CORRECTED: ("angle_corrector", JointState),
 }
+"""Who says of a sample what."""
 
 LONGEST_ANSWER_S = 1.0
 """So long the last sample waits for its answers, where nobody may be there to give them."""
@@ -137,20 +132,21 @@ class CellSimulator(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("cell_simulator", **options)
         declare(self, PARAMETERS)
-        seed = self.get_parameter("seed").value
+        own = values_of(self, PARAMETERS)
+        seed = own["seed"]
         settings = CellSettings(
-            rate_hz=self.get_parameter("rate_hz").value,
-            program_seconds=self.get_parameter("program_s").value,
+            rate_hz=own["rate_hz"],
+            program_seconds=own["program_s"],
             program_seed=seed,
-            experiment=self.get_parameter("experiment").value,
+            experiment=own["experiment"],
         )
-        model = load_model(model_path(self.get_parameter("model_file").value))
+        model = load_model(model_path(own["model_file"]))
         self.cell = VirtualCell(model.table, settings, np.random.default_rng(seed))
         motors = MotorNames()
         self._names = (motors.motor_1, motors.motor_2)
-        self._base_frame = checked_prefix(self.get_parameter("frame_prefix").value) + BASE_FRAME
-        self._programs = self.get_parameter("programs").value
-        self._enable_at_repeat = self.get_parameter("enable_at_repeat").value
+        self._base_frame = checked_prefix(own["frame_prefix"]) + BASE_FRAME
+        self._programs = own["programs"]
+        self._enable_at_repeat = own["enable_at_repeat"]
         self._sent = self.cell.desired(0.0)
         self._start_ns: int | None = None
         self._step = 0
@@ -166,17 +162,11 @@ class CellSimulator(Node):
         self._command = self.create_publisher(JointState, relative(MOTOR_COMMANDS), RELIABLE_QOS)
         self._measured = self.create_publisher(PoseStamped, relative(PLATFORM_POSE), RELIABLE_QOS)
         self._true = self.create_publisher(PoseStamped, "~/platform_pose_true", RELIABLE_QOS)
-        self._notes = self.create_publisher(
-            String,
-            relative(RECORDING_NOTES),
-            NOTES_QOS,
-        )
+        self._notes = self.create_publisher(String, relative(RECORDING_NOTES), NOTES_QOS)
         self._enable = self.create_client(SetBool, "angle_corrector/enable")
         self._asked_s = time.monotonic()
         self._answers: dict[str, AnswerCount] = {}
-        corrected = relative(MOTOR_COMMANDS_CORRECTED)
-        self.create_subscription(JointState, corrected, self._on_command, SENT_QUEUE)
-        for topic, message_type in ANSWERS.items():
+        for topic, (_, message_type) in SPEAKERS.items():
             answer = partial(self._on_answer, topic)
             self.create_subscription(message_type, relative(topic), answer, SENT_QUEUE)
         self.create_timer(1.0 / settings.rate_hz, self._on_timer)
@@ -187,13 +177,11 @@ class CellSimulator(Node):
             number = round(since_s * self.cell.settings.rate_hz)
             if number < self._step:
                 self._answers[topic].hear(number)
-
-    def _on_command(self, message: JointState) -> None:
-        self._on_answer(MOTOR_COMMANDS_CORRECTED, message)
-        try:
-            self._sent = MotorNames().angles(message.name, message.position)
-        except WristError as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=5.0)
+        if isinstance(message, JointState):
+            try:
+                self._sent = MotorNames().angles(message.name, message.position)
+            except WristError as error:
+                self.get_logger().warning(str(error), throttle_duration_sec=5.0)
 
     def _on_timer(self) -> None:
         if not self._may_move():
@@ -279,7 +267,7 @@ class CellSimulator(Node):
         """Return who left samples without an answer for too long."""
         longest = SILENCE_S * self.cell.settings.rate_hz
         return [
-            f"{SPEAKERS[topic]}: no answer heard to {answers.missing(self._step)} of "
+            f"{SPEAKERS[topic][0]}: no answer heard to {answers.missing(self._step)} of "
             f"{answers.asked(self._step)} samples, {answers.silence(self._step)} of them in a row"
             for topic, answers in self._answers.items()
             if answers.silence(self._step) > longest

@@ -42,14 +42,7 @@ class ModelMonitor(WristNode):
 
     def make_stream(self, settings: StreamSettings) -> MonitorStream:
         """Return the monitor's stream."""
-        values = values_of(self, MONITOR)
-        return MonitorStream(
-            None,
-            settings,
-            monitor_settings(values),
-            values["joint_age_limit_s"],
-            values["frame_age_limit_s"],
-        )
+        return MonitorStream(None, settings, monitor_settings(values_of(self, MONITOR)))
 
     def facts(self) -> dict[str, str]:
         """Return the residuals' statistics."""
