@@ -47,8 +47,6 @@ PLAN_WINDOW_NS = 2 * NANOSECONDS
 
 TWICE = "command is marked 'wrist_corrected': passed on unchanged, not corrected twice"
 
-NOTHING = np.zeros(2)
-
 
 class CorrectionStream(Stream):
     """Corrected motor angles for every command; never worse than no correction.
@@ -133,14 +131,13 @@ class CorrectionStream(Stream):
             self._remember(stamp_ns, theta, None, theta_dot)
             twice = InputError(TWICE) if self.correcting else None
             return CorrectedCommand(frame_id, np.array(positions, float), theta, None, twice)
-        one = Corrected(NOTHING, None, None, None)
-        if self._running is not None:
+        if self._running is None:
+            fault = self._judged(stamp_ns, theta)[1] if self.correcting else None
+            one = Corrected(np.zeros(2), None, fault, None)
+        else:
             one = self._corrected(self._running, stamp_ns, theta, theta_dot)
         driven = theta + one.delta
-        fault = one.fault
         forgotten = self._remember(stamp_ns, driven, one.load, theta_dot)
-        if self.correcting:
-            fault = fault or forgotten
         sent = list(positions)
         first, second = self.settings.motors.places(names)
         sent[first], sent[second] = driven.tolist()
@@ -150,7 +147,7 @@ class CorrectionStream(Stream):
             np.array(sent, float),
             driven,
             one.correction,
-            fault,
+            one.fault or (forgotten if self.correcting else None),
             one.correction is not None and self.supervisor.valid,
         )
 
