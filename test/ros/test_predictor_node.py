@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Vector3Stamped
@@ -250,7 +252,7 @@ def test_frames_of_tf_static_are_used(graph, predictor, model):
     step.transform.rotation.x, step.transform.rotation.w = 1.0, 0.0
     broken = TransformStamped(child_frame_id="none")
     broken.transform.rotation.w = 0.5
-    predictor.on_transforms([broken, step])
+    predictor.on_transforms(SimpleNamespace(transforms=[broken, step]))
     assert predictor.health.faults == 1
     graph.load(SECOND, (0, 0, 1.0, 0, 0, 0), "ft")
     wait_for_load(graph, predictor, SECOND)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from wrist_stiffness.commands.wrist_drawing import Pace, drawing_of
-from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.parameters import PREDICTION
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
@@ -43,54 +41,16 @@ from wrist_stiffness.topics import (
     WRIST_MARKERS,
 )
 
-
-class LoadWait:
-    """Joint states that wait for the load that belongs to them, in order of arrival.
-
-    A joint state is ready when a load with its own or a later stamp has arrived, for then no other
-    load can belong to it, or when it has waited for long enough.
-
-    `limit_s`: longest wait [s]; `clock_ns`: a clock that never jumps [ns].
-    """
-
-    def __init__(self, limit_s: float, clock_ns: Callable[[], int]) -> None:
-        self._limit_ns = round(limit_s * NANOSECONDS)
-        self._clock_ns = clock_ns
-        self._waiting: deque[tuple[int, JointSample]] = deque()
-
-    def __len__(self) -> int:
-        """Return how many wait."""
-        return len(self._waiting)
-
-    def forget(self) -> None:
-        """Drop all."""
-        self._waiting.clear()
-
-    def put(self, joints: JointSample) -> None:
-        """Add a joint state."""
-        self._waiting.append((self._clock_ns() + self._limit_ns, joints))
-
-    def ready(self, newest_load_ns: int | None) -> Iterator[JointSample]:
-        """Take out what need not wait any longer, in order of arrival.
-
-        `newest_load_ns`: newest stamp of the loads [ns].
-        """
-        now_ns = self._clock_ns()
-        while self._waiting:
-            deadline_ns, joints = self._waiting[0]
-            has_load = newest_load_ns is not None and joints.stamp_ns <= newest_load_ns
-            if not has_load and now_ns < deadline_ns:
-                return
-            self._waiting.popleft()
-            yield joints
-
-
 CHECKS_PER_WAIT = 4
 """How often, within the longest wait, overdue joint states are looked for."""
 
 
 class PoseErrorPredictor(WristNode):
-    """Publishes `/pose_error_predicted`; nothing for a sample that cannot be predicted."""
+    """Publishes `/pose_error_predicted`; nothing for a sample that cannot be predicted.
+
+    With `load_wait_s`, joint states wait for the load that belongs to them, in order of arrival: a
+    load with their own or a later stamp, for then no other one can belong to them.
+    """
 
     stream: PredictionStream
 
@@ -105,10 +65,11 @@ class PoseErrorPredictor(WristNode):
         self._transforms_type = transforms_type()
         if self._transforms_type is not None:
             self._transforms = self.say(self._transforms_type, TF)
-        wait_s = self.get_parameter("load_wait_s").value
-        self.waiting = LoadWait(wait_s, time.monotonic_ns)
-        if wait_s > 0.0:
-            self.every(wait_s / CHECKS_PER_WAIT, self.after_load)
+        self._wait_s = self.get_parameter("load_wait_s").value
+        # with the end of their wait, by a clock that never jumps [s]
+        self.waiting: deque[tuple[float, JointSample]] = deque()
+        if self._wait_s > 0.0:
+            self.every(self._wait_s / CHECKS_PER_WAIT, self.after_load)
         self.start()
 
     def make_stream(self, settings: StreamSettings) -> PredictionStream:
@@ -132,16 +93,22 @@ class PoseErrorPredictor(WristNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Drop the joint states that wait."""
-        self.waiting.forget()
+        self.waiting.clear()
         return super().on_deactivate(state)
 
     def _on_joint_state(self, joints: JointSample) -> None:
-        self.waiting.put(joints)
+        self.waiting.append((time.monotonic() + self._wait_s, joints))
         self.after_load()
 
     def after_load(self) -> None:
         """Predict for the joint states that need not wait any longer."""
-        for joints in self.waiting.ready(self.stream.loads.newest_ns):
+        now_s, newest_ns = time.monotonic(), self.stream.loads.newest_ns
+        while self.waiting:
+            until_s, joints = self.waiting[0]
+            has_load = newest_ns is not None and joints.stamp_ns <= newest_ns
+            if not has_load and now_s < until_s:
+                return
+            self.waiting.popleft()
             try:
                 self._predict(joints)
             except WristError as error:

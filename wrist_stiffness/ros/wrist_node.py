@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import TransformStamped, WrenchStamped
+from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -176,7 +176,7 @@ class WristNode(GuardedNode, ABC):
         """Hear what all nodes need; a load is taken before a joint state that waits."""
         transforms = transforms_type()
         if transforms is not None:
-            self.hear(transforms, TF_STATIC, self._on_tf_static, STATIC_QOS, ALL_STATES)
+            self.hear(transforms, TF_STATIC, self.on_transforms, STATIC_QOS, ALL_STATES)
         loads = wrench_reader()
         self.hear(WrenchStamped, LOAD_ESTIMATE, self._on_load, SENSOR_QOS, CONFIGURED, loads)
         self.hear(Temperature, TEMPERATURES, self._on_temperature, SENSOR_QOS, CONFIGURED)
@@ -214,14 +214,11 @@ class WristNode(GuardedNode, ABC):
         self._load_heard_s = time.monotonic()
         self.after_load()
 
-    def _on_tf_static(self, message: Any) -> None:
-        self.on_transforms(message.transforms)
-
-    def on_transforms(self, messages: Sequence[TransformStamped]) -> None:
-        """Learn sensor frames from static transforms; one that is none is left out."""
-        for message in messages:
+    def on_transforms(self, message: Any) -> None:
+        """Learn sensor frames from a tf2_msgs/TFMessage; a transform that is none is left out."""
+        for each in message.transforms:
             try:
-                self.stream.on_static_transforms([transform_of(message)])
+                self.stream.on_static_transforms([transform_of(each)])
             except WristError as error:
                 self.on_fault(error)
 
