@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from ctypes import Structure, c_double
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -131,7 +132,7 @@ class Belief(Structure):
     `followed`: the last load that was followed as it was measured.
     """
 
-    _fields_ = [
+    _fields_: ClassVar[Sequence[Any]] = [
         *[("rules", c_double * 17), ("axes", c_double * 10)],  # see `compiled`
         # `state`, `seen`: places in `STATES`; `text`: in `TEXTS`
         *_numbers("state seen text told seen_s step_s candidate_s rest_s counts"),
@@ -148,6 +149,14 @@ class Belief(Structure):
         *[(name, PayloadEstimate) for name in ("payload", "candidate", "expected")],
         ("judged", c_double),  # whether the command at which the compiled loop ended was judged
     ]
+    told: float
+    rest_s: float
+    moves: float
+    behind: Sequence[float]
+    stands: float
+    stand: Sequence[float]
+    payload: PayloadEstimate
+    candidate: PayloadEstimate
 
     def __init__(self) -> None:
         super().__init__()
@@ -186,8 +195,8 @@ class Belief(Structure):
             *(*self.limit(settings), reach, of_wrist.encoder_step, of_wrist.moment),
         )
         self.axes = tuple(scales.constants)
-        known = self._expected is not None
-        self.expected = scales.estimate(self._expected) if known else PayloadEstimate()
+        expected = self._expected
+        self.expected = PayloadEstimate() if expected is None else scales.estimate(expected)
         return CompiledSupervisor(self._row, self.stamps, valid)
 
     def go_on(self) -> bool:
