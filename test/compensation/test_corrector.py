@@ -125,7 +125,7 @@ def test_a_block_is_its_commands_one_by_one_to_the_bit(seed):
             assert np.array_equal(rows.active[i], one.correction.prediction.active)
     assert len(faults) >= 5
     assert np.abs(rows.applied).max() > 1e-5
-    assert np.array_equal(together.applied.value, alone.applied.value)
+    assert np.array_equal(together.applied, alone.applied)
 
 
 WITHOUT = """

@@ -91,11 +91,11 @@ class CorrectionStream(Stream):
     @property
     def applied(self) -> Array:
         """What is added to the commands now (2,) [rad]."""
-        return self._corrector.applied.value
+        return self._corrector.applied
 
     def resume(self, paused_s: float) -> None:
         """Correct again after a pause [s]: the correction faded, and what is held is seen anew."""
-        self._corrector.applied.fade(paused_s, self.settings.safety)
+        self._corrector.fade(paused_s, self.settings.safety)
         self._corrector.release()
         self.supervisor.lost()
         self.active = True

@@ -21,12 +21,20 @@ from wrist_stiffness.compensation.correction import (
     as_applied,
     correct,
 )
+from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.objective import DEPENDENT, OBJECTIVES, Objective
 from wrist_stiffness.compensation.running_model import RunningModel
-from wrist_stiffness.compensation.safety import AppliedCorrection, guard_weight
+from wrist_stiffness.compensation.safety import (
+    LONGEST_STEP_S,
+    SafetySettings,
+    between,
+    guard_weight,
+    within_joint_limits,
+)
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.mechanism.compiled import (
+    NEVER_NS,
     CompiledCommands,
     CompiledSupervisor,
     CompiledWrist,
@@ -47,10 +55,15 @@ class Corrected(NamedTuple):
 
 
 class Corrector:
-    """What one stream of commands remembers of its corrections."""
+    """What one stream of commands remembers of its corrections.
+
+    What is applied begins at zero, so that enabling is a ramp, and moves towards what is wanted at
+    the slew limit.
+    """
 
     def __init__(self) -> None:
-        self.applied = AppliedCorrection()  # what is added to the commands
+        self.applied = np.zeros(2)  # (2,), what was added to the last command [rad]
+        self.stamp_ns = np.array([NEVER_NS])  # (1,), its stamp [ns]
         self.held = np.zeros(2)  # (2,), the correction that was found last [rad]
         self._settings_of: tuple[StreamSettings, ErrorModel] | None = None
         self._task = self._safety = np.zeros(0)
@@ -62,7 +75,12 @@ class Corrector:
     def reset(self) -> None:
         """Begin at zero again."""
         self.release()
-        self.applied.reset()
+        self.applied[:] = 0.0
+
+    def fade(self, seconds: float, settings: SafetySettings) -> None:
+        """Move towards zero for a time [s] in which no command came."""
+        reach = settings.slew * seconds
+        self.applied -= between(self.applied, -reach, reach)
 
     def compiled_settings(self, model: ErrorModel, settings: StreamSettings) -> tuple[Array, Array]:
         """Return what the compiled search and the compiled guards must know."""
@@ -90,8 +108,7 @@ class Corrector:
     ) -> int:
         """Judge and correct commands from a place on; return the first that this cannot serve."""
         task, safety = self.compiled_settings(running.model, settings)
-        applied = self.applied
-        state = CorrectorState(self.held, running.contact, applied.value, applied.stamp_ns)
+        state = CorrectorState(self.held, running.contact, self.applied, self.stamp_ns)
         return compiled.correct(task, safety, commands, state, found, supervisor, begin)
 
     def searched(
@@ -124,8 +141,13 @@ class Corrector:
                 wanted = share(turn) * faded(running, settings, found)
             except WristError as error:
                 fault = error
+        last_ns, self.stamp_ns[0] = int(self.stamp_ns[0]), stamp_ns
+        passed_ns = 0 if last_ns == NEVER_NS else max(stamp_ns - last_ns, 0)
+        reach = settings.safety.slew * min(passed_ns / NANOSECONDS, LONGEST_STEP_S)
+        near = self.applied + between(wanted - self.applied, -reach, reach)
         limits = running.model.table.geometry.limits
-        delta = self.applied.advance(stamp_ns, theta, wanted, limits, settings.safety)
+        self.applied[:] = within_joint_limits(theta, near, limits) - theta
+        delta = self.applied.copy()
         applied = None if found is None else as_applied(found, delta)
         return Corrected(delta, applied, fault, load)
 

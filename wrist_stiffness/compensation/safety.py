@@ -10,7 +10,6 @@ import numpy as np
 from wrist_stiffness.compensation.intake import MotorNames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.errors import InputError, StaleCommandError
-from wrist_stiffness.mechanism.compiled import NEVER_NS
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.geometry import Limits
@@ -69,48 +68,6 @@ def within_joint_limits(theta: Array, delta: Array, limits: Limits) -> Array:
 def between(values: Array, lowest: Array | float, highest: Array | float) -> Array:
     """Return values within limits; a third of the time of `numpy.clip` on two angles."""
     return np.minimum(np.maximum(values, lowest), highest)
-
-
-class AppliedCorrection:
-    """What is really added to the commands, and how it moves towards what is wanted.
-
-    It begins at zero, so that enabling is a ramp, and ends there at the slew limit.
-    """
-
-    def __init__(self) -> None:
-        self.value = np.zeros(2)  # (2,), what was added to the last command [rad]
-        self.stamp_ns = np.array([NEVER_NS])  # (1,), its stamp [ns]
-
-    def reset(self) -> None:
-        """Begin at zero again."""
-        self.value[:] = 0.0
-
-    def fade(self, seconds: float, settings: SafetySettings) -> None:
-        """Move towards zero for a time [s] in which no command came."""
-        reach = settings.slew * seconds
-        self.value -= between(self.value, -reach, reach)
-
-    def advance(
-        self, stamp_ns: int, theta: Array, wanted: Array, limits: Limits, settings: SafetySettings
-    ) -> Array:
-        """Return the correction for the command of a stamp.
-
-        `stamp_ns`: of the command; one that is not later than the one before changes nothing [ns].
-        `theta` (2,): commanded angles [rad].  `wanted` (2,): correction that would meet the
-        objective; zero where there shall be none [rad].  `limits`: of the joints.  `settings`:
-        slew.  Gives (2,): to be added to the command [rad].
-        """
-        reach = settings.slew * self._seconds_since_last(stamp_ns)
-        near = self.value + between(wanted - self.value, -reach, reach)
-        self.value[:] = within_joint_limits(theta, near, limits) - theta
-        return self.value.copy()
-
-    def _seconds_since_last(self, stamp_ns: int) -> float:
-        last_ns = int(self.stamp_ns[0])
-        self.stamp_ns[0] = stamp_ns
-        if last_ns == NEVER_NS:
-            return 0.0
-        return min(max(stamp_ns - last_ns, 0) / NANOSECONDS, LONGEST_STEP_S)
 
 
 def require_fresh(what: str, stamp_ns: int, now_ns: int, limit_s: float) -> None:
