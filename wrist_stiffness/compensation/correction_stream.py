@@ -303,8 +303,11 @@ class CorrectionStream(Stream):
     ) -> Corrected:
         """Correct one command: as a block of one, else in Python."""
         compiled, load = running.compiled, None
-        commands = self._block_of_one(stamp_ns, theta) if self.correcting else None
-        if compiled is not None and commands is not None:
+        if (
+            compiled is not None
+            and self.correcting
+            and (commands := self._block_of_one(stamp_ns, theta)) is not None
+        ):
             found, valid = CorrectedRows.room(1, compiled.sectors), np.empty(1, dtype=bool)
             end, load = self._compiled(running, compiled, commands, found, valid)
             if end == 1 and load is not None:
