@@ -15,7 +15,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals
-from wrist_stiffness.sessions.reading.pose_track import PoseTrack
+from wrist_stiffness.sessions.reading.pose_track import MeasuredTrack
 from wrist_stiffness.sessions.reading.session import session_of
 from wrist_stiffness.sessions.reading.signals import Signal
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
@@ -147,7 +147,7 @@ def as_read(recorded: MeasuredSession) -> MeasuredSession:
     )
     # Of a sample without any reading there is no message.
     told = recorded.measured.any(axis=1)
-    track = PoseTrack(
+    track = MeasuredTrack(
         time_ns[told], recorded.shift[told], recorded.rotation[told], recorded.covariance
     )
     session = session_of(recorded.name, machine, track, wrist())

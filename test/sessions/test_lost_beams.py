@@ -8,7 +8,7 @@ from wrist_stiffness.commands.simulate import simulate_recording
 from wrist_stiffness.sessions.in_pieces import rigid_rotation
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams, spikes
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals
-from wrist_stiffness.sessions.reading.pose_track import PoseTrack
+from wrist_stiffness.sessions.reading.pose_track import MeasuredTrack
 from wrist_stiffness.sessions.reading.session import read_session, session_of
 from wrist_stiffness.sessions.reading.signals import Signal
 from wrist_stiffness.simulation.catalogue import HiddenEffect
@@ -192,7 +192,7 @@ def test_a_late_stamp_hides_no_lost_beam_of_a_rotation(worked, table, late_ms):
     angles = Signal(own, step * np.round(cell.desired(1e-9 * own) / step))
     stamps = np.round(1e9 * time).astype(np.int64)
     machine = MachineSignals(angles, None, Signal(stamps, sample.wrench), False, {}, {})
-    track = PoseTrack(stamps + 1_000_000 * late_ms, np.full((1200, 3), np.nan), rotation)
+    track = MeasuredTrack(stamps + 1_000_000 * late_ms, np.full((1200, 3), np.nan), rotation)
     session = session_of("late", machine, track, table)
     measured = session.measured.any(axis=1)
     gone = np.round(1e9 * session.block.time[~measured]).astype(np.int64)

@@ -34,16 +34,12 @@ from wrist_stiffness.sessions.reading.csv_columns import (
     seconds,
     writer_of,
 )
-from wrist_stiffness.sessions.reading.gauge_readings import gauge_track
+from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings
 from wrist_stiffness.sessions.reading.machine_signals import machine_signals
-from wrist_stiffness.sessions.reading.pose_track import (
-    base_transform,
-    last_of_equal,
-    measured_components,
-)
+from wrist_stiffness.sessions.reading.pose_track import base_transform, measured_components
 from wrist_stiffness.sessions.reading.refusals import require_topics
 from wrist_stiffness.sessions.reading.session import notes_of, path_stamps
-from wrist_stiffness.sessions.reading.signals import Stamps
+from wrist_stiffness.sessions.reading.signals import Stamps, last_of_equal
 from wrist_stiffness.sessions.reading.static_frames import frames_of
 from wrist_stiffness.topics import MOTOR_COMMANDS
 
@@ -101,9 +97,9 @@ def export_csv(
             time_ns, measured, names, markers = _measured(samples, known.frames)
             gauges: tuple[str, ...] = ()
         else:
-            track, names, markers = gauge_track(samples.gauges, notes), (), 0
-            time_ns, measured = track.time_ns, track.values
-            gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in track.gauges)
+            time_ns, read = gauge_readings(samples.gauges, notes, table)
+            measured, names, markers = read.values, (), 0
+            gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in read.gauges)
     except FrameError as error:
         raise FrameError("; ".join([f"{source.path}: {error}", *known.hints])) from error
     usable, unknown = machine.usable(time_ns)

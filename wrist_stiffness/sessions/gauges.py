@@ -118,7 +118,8 @@ class Readings:
     gauges: tuple[Gauge, ...]  # K of them, as they stand
     mechanism: Mechanism
     up: Array  # (3,), unit vector against gravity in F
-    values: Array  # (n, K), readings less those of the rigid wrist [m] or [rad]; NaN = not read
+    # (n, K), in a session less those of the rigid wrist [m] or [rad]; NaN = not read
+    values: Array
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:

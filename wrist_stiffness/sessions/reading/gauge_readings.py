@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording.samples import GaugeSamples
 from wrist_stiffness.sessions.gauges import Gauge, Readings
-from wrist_stiffness.sessions.reading.pose_track import last_of_equal
-from wrist_stiffness.sessions.reading.signals import Stamps
+from wrist_stiffness.sessions.reading.signals import Stamps, last_of_equal
 
 GAUGES = "gauges"
 """Key of the notes: what stands where, a list in the order of the readings."""
@@ -42,17 +41,13 @@ ANGLES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class GaugeTrack:
-    """Readings by stamp."""
+def gauge_readings(
+    samples: GaugeSamples, notes: Mapping[str, Any], table: Table
+) -> tuple[Stamps, Readings]:
+    """Return readings as they were read, in the order of their stamps [ns].
 
-    time_ns: Stamps  # (n,) int64, rising [ns]
-    gauges: tuple[Gauge, ...]  # as the recording describes them
-    values: Array  # (n, K), as they were read [m] or [rad]; NaN = not read
-
-
-def gauge_track(samples: GaugeSamples, notes: Mapping[str, Any]) -> GaugeTrack:
-    """Return readings in the order of their stamps (InputError if no note says of what)."""
+    Raises `InputError` if no note says of what they are.
+    """
     try:
         gauges = tuple(Gauge.of_note(facts) for facts in notes[GAUGES])
     except (KeyError, TypeError, ValueError) as error:
@@ -63,25 +58,24 @@ def gauge_track(samples: GaugeSamples, notes: Mapping[str, Any]) -> GaugeTrack:
     names = samples.names[0].tolist()
     if missing := [each.name for each in gauges if each.name not in names]:
         raise InputError(f"gauge {missing[0]} of the notes was never read: {', '.join(names)} were")
-    order = last_of_equal(samples.time_ns)
-    columns = [names.index(each.name) for each in gauges]
-    return GaugeTrack(samples.time_ns[order], gauges, samples.value[order][:, columns])
-
-
-def held_to(
-    table: Table, gauges: Sequence[Gauge], values: Array, rotation: Array
-) -> tuple[Readings, list[str]]:
-    """Return readings less those of the rigid wrist, with the mountings that fit it, and remarks.
-
-    `gauges`: K of them, as somebody measured where they stand; `values` (n, K) [m] or [rad];
-    `rotation` (n, 3, 3): of the rigid wrist.  Raises `InputError` if a reading has a wrong sign or
-    unit, or nothing stands where it is said to.
-    """
+    rows, columns = last_of_equal(samples.time_ns), [names.index(each.name) for each in gauges]
     gravity = table.geometry.gravity
     length = float(np.linalg.norm(gravity))
     up = -gravity / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    values = samples.value[rows][:, columns]
+    return samples.time_ns[rows], Readings(gauges, table.mechanism, up, values)
+
+
+def held_to(read: Readings, rotation: Array) -> tuple[Readings, list[str]]:
+    """Return readings less those of the rigid wrist, with the mountings that fit it, and remarks.
+
+    `read`: of gauges as somebody measured where they stand; `rotation` (n, 3, 3): of the rigid
+    wrist.  Raises `InputError` if a reading has a wrong sign or unit, or nothing stands where it is
+    said to.
+    """
+    up = read.up
     found, left, remarks = [], [], []
-    for each, own in zip(gauges, values.T, strict=True):
+    for each, own in zip(read.gauges, read.values.T, strict=True):
         seen = np.isfinite(own)
         if seen.any():
             _require_right(each, own[seen], each.reading(np.zeros(3), rotation[seen], up))
@@ -90,7 +84,7 @@ def held_to(
             own = own - zero - each.reading(np.zeros(3), rotation, up)
         found.append(each)
         left.append(own)
-    return Readings(tuple(found), table.mechanism, up, np.stack(left, axis=1)), remarks
+    return replace(read, gauges=tuple(found), values=np.stack(left, axis=1)), remarks
 
 
 def _require_right(gauge: Gauge, values: Array, rigid: Array) -> None:

@@ -65,8 +65,13 @@ class MachineSignals:
         """Tell at which stamps (n,) [ns] angles and load are known, and why not at the others."""
         own = self.angles.time_ns
         during = (own[0] <= time_ns) & (time_ns <= own[-1])
-        near = self.angles.near(time_ns, round(JOINT_GAP_S * NANOSECONDS))
-        way, straight = self._told_between(time_ns)
+        before = own[np.maximum(self.angles.newest(time_ns), 0)]
+        after = own[np.minimum(np.searchsorted(own, time_ns), len(own) - 1)]
+        near = np.minimum(after - time_ns, time_ns - before) <= JOINT_GAP_S * NANOSECONDS
+        way, straight = np.ones((2, len(time_ns)), dtype=bool)
+        apart = after - before > DENSE_S * NANOSECONDS
+        if apart.any():
+            way[apart], straight[apart] = self._between(time_ns[apart], before[apart], after[apart])
         newest = self.loads.newest(time_ns)
         age = time_ns - self.loads.time_ns[newest]
         loads = (newest >= 0) & (age <= round(self.load_age_limit_s * NANOSECONDS))
@@ -87,25 +92,14 @@ class MachineSignals:
             usable &= known
         return usable, tuple(reasons)
 
-    def _told_between(self, time_ns: Stamps) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Tell what is known of the way between the joint states around stamps (n,).
-
-        Gives `way`, `straight` (n,) bool: where it is no pause, or one without motion; where it is
-        as good as straight.
-        """
-        own = self.angles.time_ns
-        before = own[np.maximum(self.angles.newest(time_ns), 0)]
-        after = own[np.minimum(np.searchsorted(own, time_ns), len(own) - 1)]
-        way, straight = np.ones((2, len(time_ns)), dtype=bool)
-        apart = after - before > DENSE_S * NANOSECONDS
-        if apart.any():
-            way[apart], straight[apart] = self._between(time_ns[apart], before[apart], after[apart])
-        return way, straight
-
     def _between(
         self, time_ns: Stamps, before: Stamps, after: Stamps
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Tell the same of stamps whose joint states before and after are not dense, (n,) each."""
+        """Tell what is known of the way between joint states that are not dense.
+
+        Of stamps (n,), by those of the states before and after.  Gives `way`, `straight` (n,) bool:
+        where it is no pause, or one without motion; where it is as good as straight.
+        """
         own, angle = self.angles.time_ns, self.angles.interpolated
         gap = after - before
         nearest = np.where(time_ns - before < after - time_ns, before, after)
@@ -150,29 +144,10 @@ def machine_signals(
     recorded = in_order(samples.joints.time_ns, samples.joints.position)
     read, held_s = without_held(recorded)
     angles, wild = without_wild(read)
-    for signal, nothing in (
-        (angles, "no joint state has finite angles"),
-        (loads, "no load estimate is finite"),
-    ):
-        if len(signal) == 0:
-            raise InputError(nothing)
-    told = _told_speeds(samples.joints, read)
-    fault = "" if told is None else fault_of(told, angles)
-    temperatures = _slow(samples.temperatures)
-    return MachineSignals(
-        angles,
-        _speeds(angles) if told is None or fault else told,
-        loads,
-        on_platform,
-        temperatures,
-        _slow(samples.covariates),
-        (*_said(wild, len(read), held_s), *filter(None, [fault]), *_doubted(temperatures)),
-        load_age_limit_s,
-    )
-
-
-def _said(wild: int, states: int, held_s: float) -> tuple[str, ...]:
-    """Return what is wrong with joint states."""
+    if len(angles) == 0:
+        raise InputError("no joint state has finite angles")
+    if len(loads) == 0:
+        raise InputError("no load estimate is finite")
     remarks = []
     if held_s:
         remarks.append(
@@ -180,13 +155,14 @@ def _said(wild: int, states: int, held_s: float) -> tuple[str, ...]:
             "when they first appear, and are interpolated between"
         )
     if wild:
-        remarks.append(f"{wild} of {states} joint states are wild: left out")
-    return tuple(remarks)
-
-
-def _doubted(temperatures: Mapping[str, Signal]) -> tuple[str, ...]:
-    """Return what is odd about temperatures: whose they are, and their unit."""
-    remarks = []
+        remarks.append(f"{wild} of {len(read)} joint states are wild: left out")
+    speeds = _told_speeds(samples.joints, recorded, read)
+    fault = "" if speeds is None else fault_of(speeds, angles)
+    if fault:
+        remarks.append(fault)
+    if speeds is None or fault:
+        speeds = _speeds(angles)
+    temperatures = _slow(samples.temperatures)
     if foreign := [name for name in temperatures if name not in THERMOMETERS]:
         remarks.append(
             f"temperatures of {', '.join(map(repr, foreign))}: the wrist has no such place; known "
@@ -198,7 +174,17 @@ def _doubted(temperatures: Mapping[str, Signal]) -> tuple[str, ...]:
             f"temperatures of {', '.join(hot)} go up to {max(highest.values()):.4g} degC: are they "
             "in K?"
         )
-    return tuple(remarks)
+    covariates = _slow(samples.covariates)
+    return MachineSignals(
+        angles,
+        speeds,
+        loads,
+        on_platform,
+        temperatures,
+        covariates,
+        tuple(remarks),
+        load_age_limit_s,
+    )
 
 
 def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
@@ -218,11 +204,10 @@ def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
     return in_order(loads.time_ns, wrench), any(on_platform.values())
 
 
-def _told_speeds(joints: JointSamples, read: Signal) -> Signal | None:
+def _told_speeds(joints: JointSamples, recorded: Signal, read: Signal) -> Signal | None:
     """Return the speeds where angles were read, None where drivers leave them out or at zero."""
     speeds = in_order(joints.time_ns, joints.velocity)
-    whole = len(speeds) == len(in_order(joints.time_ns, joints.position))
-    if not whole or not np.any(speeds.values != 0.0):
+    if len(speeds) != len(recorded) or not np.any(speeds.values != 0.0):
         return None
     rows = np.searchsorted(speeds.time_ns, read.time_ns)
     return Signal(read.time_ns, speeds.values[rows])

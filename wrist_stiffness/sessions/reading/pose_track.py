@@ -1,4 +1,4 @@
-"""Measured poses of the platform in F, whatever the instrument said them in."""
+"""What an instrument measured: poses of the platform in F, whatever it said them in."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from wrist_stiffness.lookup.readout import MIN_SPREAD_RATIO
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
-from wrist_stiffness.sessions.reading.signals import Signal, Stamps
+from wrist_stiffness.sessions.gauges import Readings
+from wrist_stiffness.sessions.reading.signals import Signal, Stamps, last_of_equal
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
@@ -36,8 +37,8 @@ MIRROR_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class PoseTrack:
-    """Measured poses by stamp."""
+class MeasuredTrack:
+    """Measured poses, or readings of gauges in place of them, by stamp."""
 
     time_ns: Stamps  # (n,) int64, rising [ns]
     shift: Array  # (n, 3), position of the platform's point O in F [m]; NaN = not measured
@@ -47,13 +48,18 @@ class PoseTrack:
     remarks: tuple[str, ...] = ()  # what could not be used
     # all of this is in the axes of an instrument that stands anywhere, not in F
     unplaced: bool = False
+    readings: Readings | None = None  # (n, K), as they were read
 
     def __len__(self) -> int:
-        """Return the number of poses."""
+        """Return the number of stamps."""
         return len(self.time_ns)
 
+    def with_remark(self, remark: str) -> MeasuredTrack:
+        """Return the track with one more remark."""
+        return replace(self, remarks=(*self.remarks, remark))
 
-def pose_track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
+
+def pose_track(samples: Samples, markers: Array, frames: Frames) -> MeasuredTrack:
     """Return the measured poses of a recording in the order of their stamps.
 
     `samples`: with poses or markers; poses are used where there are both; `markers` (k, 3): nominal
@@ -62,43 +68,39 @@ def pose_track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
     `instrument`; `InputError` if the markers are not those of the geometry or too few of them were
     ever seen.
     """
-    measured = [each for each in (samples.poses, samples.markers) if len(each.time_ns)]
-    unplaced = INSTRUMENT_FRAME in measured[0].frame_id
+    posed, marked = len(samples.poses.time_ns) > 0, len(samples.markers.time_ns) > 0
+    own_frame = samples.poses.frame_id if posed else samples.markers.frame_id
+    unplaced = INSTRUMENT_FRAME in own_frame
     if unplaced:
-        names = {*measured[0].frame_id.tolist(), *samples.frame_poses.frame_id.tolist()}
+        names = {*own_frame.tolist(), *samples.frame_poses.frame_id.tolist()}
         if len(names) > 1:
             raise FrameError(f"poses come in several frames: {', '.join(sorted(names))}")
         own = {INSTRUMENT_FRAME: SensorFrame(BASE_FRAME)}
         frames = Frames({**frames.sensors, **own}, frames.prefix)
-    return replace(_track(samples, markers, frames), unplaced=unplaced)
-
-
-def _track(samples: Samples, markers: Array, frames: Frames) -> PoseTrack:
-    if len(samples.poses.time_ns):
+    if posed:
         track = _track_of_poses(samples.poses, "measured pose", frames)
-        if len(samples.markers.time_ns):
-            unused = "markers and poses were measured: the poses are used"
-            track = replace(track, remarks=(*track.remarks, unused))
     else:
         track = _track_of_markers(samples.markers, markers, frames)
+    if posed and marked:
+        track = track.with_remark("markers and poses were measured: the poses are used")
     if len(samples.frame_poses.time_ns):
-        return without_frame_motion(
-            track, _track_of_poses(samples.frame_poses, "frame pose", frames)
-        )
-    return track
+        frame = _track_of_poses(samples.frame_poses, "frame pose", frames)
+        track = without_frame_motion(track, frame)
+    return replace(track, unplaced=unplaced)
 
 
-def without_frame_motion(track: PoseTrack, frame: PoseTrack) -> PoseTrack:
+def without_frame_motion(track: MeasuredTrack, frame: MeasuredTrack) -> MeasuredTrack:
     """Take the motion of the frame out of the platform's poses.
 
-    `frame`: poses of a target on the frame by the same instrument.  Gives `PoseTrack`: as seen from
-    the frame at the start.  Unchanged, with a remark, where the frame stood still within its noise:
+    `frame`: poses of a target on the frame by the same instrument.  Gives poses as seen from the
+    frame at the start.  Unchanged, with a remark, where the frame stood still within its noise:
     the noise of a target that is far from O would only be added.
     """
     known = np.isfinite(frame.shift).all(axis=1) & np.isfinite(frame.rotation).all(axis=(1, 2))
     if known.sum() < LEAST_FRAME_POSES:
-        few = f"only {known.sum()} poses of the frame were measured: its motion stays in"
-        return replace(track, remarks=(*track.remarks, few))
+        return track.with_remark(
+            f"only {known.sum()} poses of the frame were measured: its motion stays in"
+        )
     first = slice(0, max(1, int(REFERENCE_SHARE * known.sum())))
     turned = Rotation.from_matrix(frame.rotation[known])
     start_turn, start = turned[first].mean(), frame.shift[known][first].mean(axis=0)
@@ -107,22 +109,18 @@ def without_frame_motion(track: PoseTrack, frame: PoseTrack) -> PoseTrack:
     motion = np.hstack([shift, turn.as_rotvec()])
     white = 0.5 * np.mean(np.diff(motion, axis=0) ** 2, axis=0)
     if np.all(motion.var(axis=0) <= MOVED * white):
-        still = "the frame stood still within the noise of its measurement: nothing is taken out"
-        return replace(track, remarks=(*track.remarks, still))
+        return track.with_remark(
+            "the frame stood still within the noise of its measurement: nothing is taken out"
+        )
     signal = Signal(frame.time_ns[known], motion)
     inside = np.clip(track.time_ns, signal.time_ns[0], signal.time_ns[-1])
     at = signal.interpolated(inside)
     back = Rotation.from_rotvec(at[:, 3:]).inv()
     largest = np.max(np.linalg.norm(motion.reshape(-1, 2, 3), axis=2), axis=0)
-    taken = (
+    shift, rotation = back.apply(track.shift - at[:, :3]), back.as_matrix() @ track.rotation
+    return replace(track, shift=shift, rotation=rotation).with_remark(
         f"motion of the frame taken out: up to {1e6 * largest[0]:.1f} um at O and "
         f"{1e3 * np.degrees(largest[1]):.1f} mdeg"
-    )
-    return replace(
-        track,
-        shift=back.apply(track.shift - at[:, :3]),
-        rotation=back.as_matrix() @ track.rotation,
-        remarks=(*track.remarks, taken),
     )
 
 
@@ -141,7 +139,7 @@ def measured_components(poses: PoseSamples) -> tuple[Array, Array]:
     return position, quaternion
 
 
-def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
+def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> MeasuredTrack:
     turn, origin = base_transform(poses.frame_id, what, frames)
     shift, quaternion = measured_components(poses)
     turned = np.asarray(np.isfinite(quaternion).all(axis=1))
@@ -167,7 +165,8 @@ def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> PoseTrack:
             "alone is used"
         )
     lost = int((~turned & np.isnan(shift).all(axis=1) & ~huge.all(axis=1)).sum())
-    return _in_time_order(poses.time_ns, shift + origin, rotation, covariance, what, lost, remarks)
+    track = MeasuredTrack(poses.time_ns, shift + origin, rotation, covariance, tuple(remarks))
+    return _in_time_order(track, what, lost)
 
 
 def _stated(covariance: Array, measured: NDArray[np.bool_]) -> Array | None:
@@ -185,7 +184,7 @@ def _stated(covariance: Array, measured: NDArray[np.bool_]) -> Array | None:
     return typical if np.all(np.diag(typical)[ever] > 0.0) else None
 
 
-def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) -> PoseTrack:
+def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) -> MeasuredTrack:
     """Return the poses of markers in F; NaN where too few were seen."""
     what = "measured markers"
     turn, origin = base_transform(samples.frame_id, what, frames)
@@ -197,7 +196,8 @@ def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) ->
         )
     places = samples.position @ turn.T + origin
     shift, rotation = poses_from_markers(nominal, places)
-    if mirrored(nominal, places):
+    motion, mirror = (_misfit(nominal, sign * places) for sign in (1.0, -1.0))
+    if mirror < MIRROR_SHARE * motion:
         raise InputError(
             f"{what}: they are the mirror image of the geometry's readout points: the instrument's "
             "axes are left-handed; swap two of its axes, or turn the sign of one"
@@ -209,7 +209,7 @@ def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) ->
             f"{what}: at most {seen.max()} of {count} were seen at once; at least {LEAST_MARKERS} "
             "that are not on a line are needed for a pose"
         )
-    return _in_time_order(samples.time_ns, shift, rotation, None, what, unseen, [])
+    return _in_time_order(MeasuredTrack(samples.time_ns, shift, rotation), what, unseen)
 
 
 def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tuple[Array, Array]:
@@ -225,32 +225,19 @@ def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tup
     return found[0]
 
 
-def last_of_equal(time_ns: Stamps) -> NDArray[np.intp]:
-    """Return the rows in the order of their stamps; of equal stamps only the last one received."""
-    if np.all(np.diff(time_ns) > 0):
-        return np.arange(len(time_ns))
-    _, reverse = np.unique(time_ns[::-1], return_index=True)
-    return len(time_ns) - 1 - reverse
-
-
-def _in_time_order(
-    time_ns: Stamps,
-    shift: Array,
-    rotation: Array,
-    covariance: Array | None,
-    what: str,
-    lost: int,
-    remarks: list[str],
-) -> PoseTrack:
-    order = last_of_equal(time_ns)
+def _in_time_order(track: MeasuredTrack, what: str, lost: int) -> MeasuredTrack:
+    """Return a track of samples as they came, of which so many were lost, in order of time."""
+    count, rows = len(track), last_of_equal(track.time_ns)
     if lost:
-        remarks.append(f"{what}: {lost} of {len(time_ns)} lost by the instrument")
-    if len(order) < len(time_ns):
-        remarks.append(
-            f"{what}: {len(time_ns) - len(order)} of {len(time_ns)} have the stamp of another one: "
-            "of each only the last is used"
-        )
-    return PoseTrack(time_ns[order], shift[order], rotation[order], covariance, tuple(remarks))
+        track = track.with_remark(f"{what}: {lost} of {count} lost by the instrument")
+    time_ns, shift, rotation = track.time_ns[rows], track.shift[rows], track.rotation[rows]
+    track = replace(track, time_ns=time_ns, shift=shift, rotation=rotation)
+    if len(track) == count:
+        return track
+    return track.with_remark(
+        f"{what}: {count - len(track)} of {count} have the stamp of another one: of each only the "
+        "last is used"
+    )
 
 
 def poses_from_markers(nominal: Array, measured: Array) -> tuple[Array, Array]:
@@ -283,14 +270,8 @@ def poses_from_markers(nominal: Array, measured: Array) -> tuple[Array, Array]:
     return shift, rotation
 
 
-def mirrored(nominal: Array, measured: Array) -> bool:
-    """Tell whether measured markers, as in `poses_from_markers`, are those of a mirror image."""
-    motion, mirror = (_misfit(nominal, sign * measured) for sign in (1.0, -1.0))
-    return mirror < MIRROR_SHARE * motion
-
-
 def _misfit(nominal: Array, measured: Array) -> float:
-    """Return the median misfit of a rigid motion [m]; infinite where there is none."""
+    """Return the median misfit of a rigid motion of markers [m]; infinite where there is none."""
     shift, rotation = poses_from_markers(nominal, measured)
     off = measured - nominal @ np.swapaxes(rotation, 1, 2) - shift[:, None]
     known = np.linalg.norm(off[np.isfinite(off).all(axis=2)], axis=1)

@@ -24,17 +24,16 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError, RecordingError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
-from wrist_stiffness.sessions.reading.gauge_readings import GaugeTrack, gauge_track, held_to
+from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings, held_to
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.sessions.reading.path import GAP_S, turning_stamps
-from wrist_stiffness.sessions.reading.pose_track import PoseTrack, pose_track
+from wrist_stiffness.sessions.reading.pose_track import MeasuredTrack, pose_track
 from wrist_stiffness.sessions.reading.refusals import (
     require_enough,
     require_near,
@@ -47,8 +46,6 @@ from wrist_stiffness.sessions.reading.signals import Signal, Stamps
 from wrist_stiffness.sessions.reading.static_frames import frames_of
 from wrist_stiffness.sessions.table_range import beyond_range
 from wrist_stiffness.topics import MOTOR_COMMANDS
-
-Mask = NDArray[np.bool_]
 
 GEOMETRY = "geometry_sha256"
 """Key of the notes: checksum of the geometry file of the wrist that was recorded."""
@@ -103,13 +100,13 @@ def read_session(
     known = frames_of(recording, remaps or {}, settings.frames)
     try:
         machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
-        own = recording.path.name, machine
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
-            markers = table.geometry.platform.readout_points
-            track = pose_track(samples, markers, known.frames)
-            session = session_of(*own, track, table)
+            track = pose_track(samples, table.geometry.platform.readout_points, known.frames)
         else:
-            session = gauge_session(*own, gauge_track(samples.gauges, notes), table)
+            time_ns, readings = gauge_readings(samples.gauges, notes, table)
+            none = np.full((len(time_ns), 3, 4), np.nan)
+            track = MeasuredTrack(time_ns, none[:, :, 0], none[:, :, 1:], readings=readings)
+        session = session_of(recording.path.name, machine, track, table)
     except (FrameError, InputError, RecordingError) as error:
         hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
         raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
@@ -121,13 +118,14 @@ def read_session(
 
 
 def session_of(
-    name: str, machine: MachineSignals, track: PoseTrack, table: Table
+    name: str, machine: MachineSignals, track: MeasuredTrack, table: Table
 ) -> MeasuredSession:
     """Put the signals of a recording together: clocks, spikes, the way between poses.
 
-    `track`: measured poses in F.  Gives a session with remarks on everything that could not be
-    used, and no notes.  Raises `RecordingError` if the clocks do not overlap; `InputError` if too
-    few poses are left, or they are those of another wrist.
+    `track`: measured poses in F, or readings.  Gives a session with remarks on everything that
+    could not be used, and no notes.  Raises `RecordingError` if the clocks do not overlap;
+    `InputError` if too few poses are left, or they are those of another wrist, or gauges do not
+    stand where they are said to.
     """
     remarks = [*machine.remarks, *track.remarks]
     require_overlap(machine.angles.time_ns, track.time_ns)
@@ -139,97 +137,58 @@ def session_of(
         )
         track = replace(track, time_ns=track.time_ns - round(offset.seconds * NANOSECONDS))
         late = None
-    usable, block = _usable(machine, track.time_ns, table, remarks)
+    usable, reasons = machine.usable(track.time_ns)
+    remarks += reasons
+    theta = machine.angles.interpolated(track.time_ns[usable])
+    reachable = in_pieces(table.mechanism.reachable, theta)
+    if not reachable.all():
+        remarks.append(
+            f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
+        )
+    usable[usable] = reachable
+    if not usable.any():
+        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
     time_ns, shift, rotation = track.time_ns[usable], track.shift[usable], track.rotation[usable]
-    rigid = rigid_rotation(table, block.theta)
-    covariance = track.covariance
+    all_ns = np.union1d(time_ns, path_stamps(machine, time_ns, table))
+    rows = np.searchsorted(all_ns, time_ns)
+    block = machine.at(all_ns)
+    measured = block.take(rows)
+    rigid = rigid_rotation(table, measured.theta)
+    covariance, readings = track.covariance, track.readings
     if track.unplaced:
         found = registered(shift, rotation, rigid)
         shift, rotation = found.in_base(shift, rotation)
         covariance = None if covariance is None else found.covariance(covariance)
         remarks.append(str(found))
-    require_same_wrist(rotation, rigid, block.theta, table)
+    require_same_wrist(rotation, rigid, measured.theta, table)
     require_near(shift)
-    remarks += beyond_range(table, block)
+    if readings is not None:
+        readings, said = held_to(readings.take(usable), rigid)
+        readings = replace(readings, values=_spread(readings.values, rows, len(block)))
+        remarks += said
+    remarks += beyond_range(table, measured)
     meant = _rigid_when_measured(machine, time_ns, late, table, rigid)
-    lost = lost_beams(block.time, shift, rotation, meant, table.geometry.limits.encoder_step)
+    step = table.geometry.limits.encoder_step
+    lost = lost_beams(measured.time, shift, rotation, meant, step)
     if lost.any():
         remarks.append(f"{lost.sum()} of {len(lost)} measured poses are lost beams: left out")
-        shift, rotation = shift.copy(), rotation.copy()
-        shift[lost], rotation[lost] = np.nan, np.nan
-    if np.all(block.load == block.load[0]):
+    if np.all(measured.load == measured.load[0]):
         remarks.append(
             "the load never changes: what the load does and what is always there look the same"
         )
-    pair = None if offset is None else (offset.seconds, offset.sigma)
+    seen = rows[~lost]
     session = MeasuredSession(
-        name, block, shift, rotation, covariance, remarks=tuple(remarks), clock_offset_s=pair
-    )
-    session = _with_path(session, machine, time_ns, table)
-    require_enough(session, len(track))
-    return session
-
-
-def gauge_session(
-    name: str, machine: MachineSignals, track: GaugeTrack, table: Table
-) -> MeasuredSession:
-    """Put the signals of a recording with gauges together, as `session_of` does of poses."""
-    remarks = [*machine.remarks]
-    require_overlap(machine.angles.time_ns, track.time_ns)
-    usable, block = _usable(machine, track.time_ns, table, remarks)
-    rigid = rigid_rotation(table, block.theta)
-    readings, said = held_to(table, track.gauges, track.values[usable], rigid)
-    remarks += [*said, *beyond_range(table, block)]
-    shift, rotation = np.full((len(block), 3), np.nan), np.full((len(block), 3, 3), np.nan)
-    session = MeasuredSession(
-        name, block, shift, rotation, remarks=tuple(remarks), readings=readings
-    )
-    session = _with_path(session, machine, track.time_ns[usable], table)
-    require_enough(session, len(track.time_ns))
-    return session
-
-
-def _usable(
-    machine: MachineSignals, time_ns: Stamps, table: Table, remarks: list[str]
-) -> tuple[Mask, Block]:
-    """Tell which measurements (n,) have angles that the wrist reaches and a load; signals of these.
-
-    Why others are not used is added to the remarks.  Raises `InputError` if none can be used.
-    """
-    usable, reasons = machine.usable(time_ns)
-    remarks += reasons
-    reachable = in_pieces(table.mechanism.reachable, machine.angles.interpolated(time_ns[usable]))
-    if not reachable.all():
-        remarks.append(
-            f"{np.sum(~reachable)} measured poses are not used: the wrist cannot reach their angles"
-        )
-        usable[usable] = reachable
-    if not usable.any():
-        raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
-    return usable, machine.at(time_ns[usable])
-
-
-def _with_path(
-    session: MeasuredSession, machine: MachineSignals, time_ns: Stamps, table: Table
-) -> MeasuredSession:
-    """Return a session (n,) with rows that tell the way between measurements far apart."""
-    path_ns = path_stamps(machine, time_ns, table)
-    place = np.searchsorted(time_ns, path_ns)
-    new = time_ns[np.minimum(place, len(time_ns) - 1)] != path_ns
-    if not new.any():
-        return session
-    all_ns = np.insert(time_ns, place[new], path_ns[new])
-    rows = np.searchsorted(all_ns, time_ns)
-    readings = session.readings
-    if readings is not None:
-        readings = replace(readings, values=_spread(readings.values, rows, len(all_ns)))
-    return replace(
-        session,
-        block=machine.at(all_ns),
-        shift=_spread(session.shift, rows, len(all_ns)),
-        rotation=_spread(session.rotation, rows, len(all_ns)),
+        name,
+        block,
+        _spread(shift[~lost], seen, len(block)),
+        _spread(rotation[~lost], seen, len(block)),
+        covariance,
+        remarks=tuple(remarks),
+        clock_offset_s=None if offset is None else (offset.seconds, offset.sigma),
         readings=readings,
     )
+    require_enough(session, len(track))
+    return session
 
 
 def path_stamps(machine: MachineSignals, time_ns: Stamps, table: Table) -> Stamps:
@@ -258,7 +217,7 @@ def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
     return out
 
 
-def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOffset | None:
+def _offset(machine: MachineSignals, track: MeasuredTrack, table: Table) -> ClockOffset | None:
     known = np.isfinite(track.rotation).all(axis=(1, 2))
     every = max(1, len(machine.angles) // ANGLES_USED)
     theta, time_ns = machine.angles.values[::every], machine.angles.time_ns[::every]
@@ -270,7 +229,7 @@ def _offset(machine: MachineSignals, track: PoseTrack, table: Table) -> ClockOff
     return clock_offset(track.time_ns[known], track.rotation[known], turned)
 
 
-def _another_clock(offset: ClockOffset, machine: MachineSignals, track: PoseTrack) -> bool:
+def _another_clock(offset: ClockOffset, machine: MachineSignals, track: MeasuredTrack) -> bool:
     """Tell whether an offset is one of clocks, not a delay that the wrist's model can have."""
     period = max(_period_s(machine.angles.time_ns), _period_s(track.time_ns))
     least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * period, 3.0 * offset.sigma)

@@ -32,16 +32,6 @@ class Signal:
         found = np.stack([np.interp(at, own, column) for column in columns], axis=-1)
         return found.reshape(len(time_ns), *self.values.shape[1:])
 
-    def near(self, time_ns: Stamps, limit_ns: int) -> NDArray[np.bool_]:
-        """Tell which stamps (m,) lie inside the range with a value no farther than a limit [ns]."""
-        after = np.searchsorted(self.time_ns, time_ns)
-        before = np.searchsorted(self.time_ns, time_ns, side="right") - 1
-        last = len(self) - 1
-        gap = np.minimum(
-            self.time_ns[np.minimum(after, last)] - time_ns, time_ns - self.time_ns[before]
-        )
-        return (before >= 0) & (after <= last) & (gap <= limit_ns)
-
     def newest(self, time_ns: Stamps) -> NDArray[np.intp]:
         """Return the row of the newest value that is not younger, -1 where there is none, (m,)."""
         return np.searchsorted(self.time_ns, time_ns, side="right") - 1
@@ -55,9 +45,13 @@ def in_order(time_ns: Stamps, values: Array) -> Signal:
     """
     finite = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     time_ns, values = time_ns[finite], values[finite]
-    if len(time_ns) and np.all(np.diff(time_ns) > 0):
-        return Signal(time_ns, values)
-    order = np.argsort(time_ns, kind="stable")
-    time_ns, values = time_ns[order], values[order]
-    last = np.append(np.diff(time_ns) > 0, True)[: len(time_ns)]
-    return Signal(time_ns[last], values[last])
+    rows = last_of_equal(time_ns)
+    return Signal(time_ns[rows], values[rows])
+
+
+def last_of_equal(time_ns: Stamps) -> NDArray[np.intp] | slice:
+    """Return the rows in the order of their stamps; of equal stamps only the last one received."""
+    if np.all(np.diff(time_ns) > 0):
+        return slice(None)
+    _, reverse = np.unique(time_ns[::-1], return_index=True)
+    return len(time_ns) - 1 - reverse
