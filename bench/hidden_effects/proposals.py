@@ -76,8 +76,7 @@ def cases(sizes: Sequence[float], sound: int) -> list[Case]:
 
 def without(session: UnitSession, held: Array) -> UnitSession:
     """Return a session of which some units were not measured; their path stays."""
-    gone = np.where(held[:, None], np.nan, 0.0)
-    return replace(session, shift=session.shift + gone, turn=session.turn + gone)
+    return session.without(np.flatnonzero(held))
 
 
 def answer(case: Case) -> dict[str, Any]:

@@ -196,8 +196,8 @@ def test_a_drive_that_is_stiffer_than_stiff_is_not_asked(model, in_the_cell, sig
     soft = (find_law("drive_compliance"), "motor_1", {"compliance_mdeg_per_Nm": 3000.0})
     change = np.zeros((len(units), 6))
     change[units.measured] = about.about(about.begin()).changes([soft])[0]
-    shift, turn = units.shift + sign * change[:, :3], units.turn + sign * change[:, 3:]
-    problem = WristProblem(model, (replace(units, shift=shift, turn=turn),))
+    moved = replace(units, values=units.values + sign * change)
+    problem = WristProblem(model, (moved,))
     fit = problem.begin()
     (trial,) = (each for each in problem.trials(fit) if each.name == name)
     (first,) = ranked(fit.evidence.without_discrepancy(), [trial])

@@ -27,7 +27,7 @@ def test_what_digits_hide_is_the_scatter_of_a_mean(model, session):
     coarse = as_units(model, replace(session, shift=np.round(session.shift / DIGIT) * DIGIT))
     assert coarse.white[:3].tolist() == [0.0, 0.0, 0.0]
     assert coarse.wander[:3] == pytest.approx(DIGIT / np.sqrt(12.0), rel=1e-6)
-    hidden = (coarse.shift - fine.shift)[coarse.cut.dwell]
+    hidden = (coarse.values - fine.values)[:, :3][coarse.cut.dwell]
     assert np.sqrt(np.mean(hidden**2)) == pytest.approx(DIGIT / np.sqrt(12.0), rel=0.2)
 
 

@@ -85,33 +85,6 @@ def imported(folder, block, readings, header="a_um,b_um,c_um,d_um,e_um,level_mde
     return import_csv(table, folder / "bag.mcap", gauges_file=gauges).recording
 
 
-@pytest.mark.parametrize("gauge", GAUGES, ids=[each.name for each in GAUGES])
-def test_the_row_is_the_slope_of_the_reading_by_a_twist_of_the_platform(gauge, table):
-    block = conditions(7)
-    nominal = table.mechanism.platform_rotation(block.theta)
-    row = gauge.row(nominal, UP)
-    for axis, step in zip(np.eye(6), np.repeat([1e-6, 1e-5], 3), strict=True):
-        ends = []
-        for sign in (-1.0, 1.0):
-            rotation, shift = exp_twist(np.tile(sign * step * axis, (7, 1)))
-            ends.append(gauge.reading(shift, rotation @ nominal, UP))
-        assert np.allclose((ends[1] - ends[0]) / (2.0 * step), row @ axis, rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.parametrize("gauge", GAUGES, ids=[each.name for each in GAUGES])
-def test_mounting_columns_are_the_slopes_by_another_mounting(gauge, table):
-    nominal = table.mechanism.platform_rotation(conditions(7).theta)
-    columns = gauge.mounting(nominal, UP)
-
-    def read(step):
-        own, zero = gauge.mounted(step)
-        return zero + own.reading(NONE, nominal, UP)
-
-    for number, unit in enumerate(1e-3 * np.eye(columns.shape[1])):
-        slope = (read(unit) - read(-unit)) / 2e-3
-        assert np.allclose(slope, columns[:, number], rtol=1e-4, atol=1e-9)
-
-
 def test_a_gauge_is_the_projected_pose_of_a_tracker(tmp_path, model, table):
     """What is left of readings is what is left of poses along each gauge, but for its mounting."""
     block = conditions()

@@ -97,9 +97,9 @@ def export_csv(
             time_ns, measured, names, markers = _measured(samples, known.frames)
             gauges: tuple[str, ...] = ()
         else:
-            time_ns, read = gauge_readings(samples.gauges, notes, table)
-            measured, names, markers = read.values, (), 0
-            gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in read.gauges)
+            time_ns, own, measured = gauge_readings(samples.gauges, notes, table)
+            gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in own.each)
+            names, markers = (), 0
     except FrameError as error:
         raise FrameError("; ".join([f"{source.path}: {error}", *known.hints])) from error
     usable, unknown = machine.usable(time_ns)

@@ -142,7 +142,7 @@ def measured_sha256(session: MeasuredSession) -> str:
     rows = session.measured.any(axis=1)
     poses = np.hstack([session.shift[rows], session.rotation[rows].reshape(-1, 9)])
     if session.readings is not None:
-        poses = session.readings.values[rows]
+        poses = session.readings[rows]
     said = np.column_stack([session.block.time[rows], np.nan_to_num(poses)])
     return hashlib.sha256(said.tobytes()).hexdigest()
 

@@ -104,7 +104,7 @@ def refit_set_up(
     ends = np.cumsum([len(each) for each in observed.sessions])
     parts = np.split(observed.predicted, ends[:-1])
     free = np.ones(len(PLAUSIBLE), dtype=bool)
-    gauges = observed.sessions[0].readings is not None
+    gauges = observed.sessions[0].gauges is not None
     for effect in (*calibrated, *(REGISTRATIONS if gauges else ())):
         free[GROUPS.get(effect, slice(0))] = False
     return tuple(
@@ -147,7 +147,7 @@ def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask
     instrument, target = (np.eye(3), np.zeros(3)), (np.eye(3), np.zeros(3))
     zero, tare = np.zeros(2), np.zeros(6)
     taken = np.zeros(len(PLAUSIBLE))
-    pointed = np.isfinite(session.turn.sum(axis=1)) | (session.readings is not None)
+    pointed = np.isfinite(session.values[:, 3:].sum(axis=1)) | (session.gauges is not None)
     wander = usual_wander(session.quantities)
 
     def said() -> tuple[Array, Array]:

@@ -59,12 +59,11 @@ class Mistake:
     def put_right(self, session: UnitSession) -> UnitSession:
         """Return the session without the mistake."""
         cut = replace(session.cut, block=self.block(session.block))
-        right = replace(session, cut=cut, shift=self.shift_factor * session.shift)
-        read = session.readings
-        if read is None or not self.gauge:
-            return right
-        sign = np.where([each.name == self.gauge for each in read.gauges], -1.0, 1.0)
-        return replace(right, readings=replace(read, values=sign * read.values))
+        factor = np.repeat([self.shift_factor, 1.0], 3)
+        if session.gauges is not None:
+            turned = [each.name == self.gauge for each in session.gauges.each]
+            factor = np.where(turned, -1.0, 1.0)
+        return replace(session, cut=cut, values=factor * session.values)
 
     def measured_right(self, session: MeasuredSession) -> MeasuredSession:
         """Return a session as it was measured without the mistake."""
@@ -79,10 +78,10 @@ class Mistake:
     def concerns(self, session: UnitSession) -> bool:
         """Tell whether the session could have it: a measured rotation names its own motors."""
         same_angles = self.block(session.block).theta is session.block.theta
-        if session.readings is not None:
+        if session.gauges is not None:
             # Where the wrist moved, motors, units and signs were told when these were held to it.
             return same_angles and self.shift_factor == 1.0 and not session.moves(self.gauge)
-        return same_angles or not np.isfinite(session.turn).any()
+        return same_angles or not np.isfinite(session.values[:, 3:]).any()
 
 
 def _load(factor: float) -> Callable[[Block], Block]:
@@ -177,8 +176,8 @@ def suspected(
     the refit; `mistakes`: those that are tried.
     """
     before, count = left.error, _independent(left.observations)
-    read = observed.sessions[0].readings
-    mistakes = (*mistakes, *(map(_turned, read.gauges) if read is not None else ()))
+    gauges = observed.sessions[0].gauges
+    mistakes = (*mistakes, *(map(_turned, gauges.each) if gauges is not None else ()))
 
     def gains(mistake: Mistake) -> dict[str, float]:
         """Return the logarithm of its likelihood against that of none, by quantity."""

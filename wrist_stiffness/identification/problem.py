@@ -152,7 +152,7 @@ class FitProblem:
 
     def _mounted(self, free: FreeEffect) -> bool:
         """Tell whether the mountings of gauges are all that an effect could be."""
-        gauges = self.sessions[0].readings is not None
+        gauges = self.sessions[0].gauges is not None
         return gauges and free.effect.law.id in REGISTRATIONS
 
     @property

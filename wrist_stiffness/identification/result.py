@@ -208,7 +208,7 @@ class Fit:
     def joint(self) -> JointUncertainty:
         """What the uncertainties of all parameters make of a prediction together."""
         rows, measured = self.columns, self.problem.table.measured
-        if any(each.readings is not None for each in self.problem.sessions):
+        if any(each.gauges is not None for each in self.problem.sessions):
             rows = self.problem.twists(self.z)
             measured = np.ones(rows.shape[:2], dtype=bool)
         variance = np.einsum("uij,jk,uik->ui", rows, self.covariance, rows)

@@ -1,19 +1,18 @@
 """Dial gauges and inclinometers: what each reads of the platform's pose, and what of its error.
 
 A gauge reads one number of a pose.  To first order an error twist (t, phi) at O changes it by one
-row h of numbers, h @ (t, phi): the gauge's direction and its lever, the inclinometer's axis.  A
-tracker is the special case in which the rows are those of the identity.
+row h of numbers, h @ (t, phi).  A tracker is the special case in which the rows are those of the
+identity.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.inference import Quantity
 from wrist_stiffness.mechanism.components import Array
@@ -34,6 +33,10 @@ ZERO_M, ZERO_RAD = 0.02, 0.1
 POINT_M, DIRECTION_RAD = 1e-3, np.radians(2.0)
 """Standard deviations with which a ball's place and a direction are known, as a ruler and a square
 tell them (assumed)."""
+
+STEP = 1e-4
+"""Of differences, in [m], [rad] and standard deviations of a mounting: curvature and rounding are
+nothing beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,26 +83,14 @@ class Gauge:
             return np.asarray(np.arcsin(np.clip(rotation @ self.direction @ up, -1.0, 1.0)))
         return np.asarray((rotation @ self.point + shift) @ self.direction)
 
-    def row(self, rotation: Array, up: Array) -> Array:
-        """Return by how much a twist at O in F changes the reading, (n, 6)."""
-        if self.point is None:
-            arrow = rotation @ self.direction
-            slope = np.sqrt(np.maximum(1.0 - (arrow @ up) ** 2, 1e-6))
-            turned = np.cross(arrow, up) / slope[:, None]
-            return np.concatenate([np.zeros_like(turned), turned], axis=1)
-        lever = np.cross(rotation @ self.point, self.direction)
-        return np.concatenate([np.tile(self.direction, (len(lever), 1)), lever], axis=1)
-
     def mounting(self, rotation: Array, up: Array) -> Array:
         """Return what a standard deviation of its zero, place and directions does, (n, q)."""
-        aside = np.linalg.svd(self.direction[None])[2][1:] * DIRECTION_RAD
-        if self.point is None:
-            slope = np.sqrt(np.maximum(1.0 - (rotation @ self.direction @ up) ** 2, 1e-6))
-            turned = (rotation @ aside.T).transpose(0, 2, 1) @ up / slope[:, None]
-            return np.concatenate([np.full((len(rotation), 1), ZERO_RAD), turned], axis=1)
-        zero = np.full((len(rotation), 1), ZERO_M)
-        moved = POINT_M * np.swapaxes(rotation, 1, 2) @ self.direction
-        return np.concatenate([zero, moved, rotation @ self.point @ aside.T], axis=1)
+
+        def read(step: Array) -> Array:
+            own, zero = self.mounted(step)
+            return zero + own.reading(np.zeros(3), rotation, up)
+
+        return _slopes(read, 3 if self.point is None else 6)
 
     def mounted(self, step: Array) -> tuple[Gauge, float]:
         """Return it with another mounting, (q,) standard deviations away, and its zero."""
@@ -111,30 +102,30 @@ class Gauge:
         return Gauge(self.name, along, self.point + POINT_M * step[1:4]), ZERO_M * float(step[0])
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """What gauges read of n samples."""
+def _slopes(function: Callable[[Array], Array], count: int) -> Array:
+    """Return the central differences (..., count) at zero of a function of so many numbers."""
+    steps = STEP * np.eye(count)
+    return np.stack([(function(each) - function(-each)) / (2.0 * STEP) for each in steps], axis=-1)
 
-    gauges: tuple[Gauge, ...]  # K of them, as they stand
+
+@dataclass(frozen=True, eq=False)
+class Gauges:
+    """All gauges of a session."""
+
+    each: tuple[Gauge, ...]  # K of them, as they stand
     mechanism: Mechanism
     up: Array  # (3,), unit vector against gravity in F
-    # (n, K), in a session less those of the rigid wrist [m] or [rad]; NaN = not read
-    values: Array
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """What is reported as one length: dial gauges together, and inclinometers."""
-        tilts = tuple(n for n, each in enumerate(self.gauges) if each.point is None)
-        lengths = tuple(n for n in range(len(self.gauges)) if n not in tilts)
+        tilts = tuple(n for n, each in enumerate(self.each) if each.point is None)
+        lengths = tuple(n for n in range(len(self.each)) if n not in tilts)
         return tuple(
-            replace(quantity, components=own, called=tuple(self.gauges[n].name for n in own))
+            replace(quantity, components=own, called=tuple(self.each[n].name for n in own))
             for quantity, own in ((GAUGES, lengths), (TILTS, tilts))
             if own
         )
-
-    def take(self, rows: slice | NDArray[np.bool_]) -> Readings:
-        """Return those of some samples, in their order."""
-        return replace(self, values=self.values[rows])
 
     def rigid(self, theta: Array) -> Array:
         """Return the rotation U -> F of the rigid wrist at angles (n, 2) [rad], (n, 3, 3)."""
@@ -147,19 +138,18 @@ class Readings:
         rotation = rotation @ rigid
         changes = [
             each.reading(shift, rotation, self.up) - each.reading(np.zeros(3), rigid, self.up)
-            for each in self.gauges
+            for each in self.each
         ]
         return np.stack(changes, axis=-1)
 
     def rows(self, theta: Array) -> Array:
         """Return by how much a twist at O in F changes the readings, (n, K, 6)."""
-        rotation = self.rigid(theta)
-        return np.stack([each.row(rotation, self.up) for each in self.gauges], axis=1)
+        return _slopes(lambda twist: self.predicted(np.tile(twist, (len(theta), 1)), theta), 6)
 
     def common(self, theta: Array) -> Array:
         """Return what standard deviations of all mountings do to the readings, (n, K, q)."""
         rotation = self.rigid(theta)
-        own = [each.mounting(rotation, self.up) for each in self.gauges]
+        own = [each.mounting(rotation, self.up) for each in self.each]
         ends = np.cumsum([each.shape[1] for each in own])
         out = np.zeros((len(theta), len(own), ends[-1]))
         for number, (each, end) in enumerate(zip(own, ends, strict=True)):

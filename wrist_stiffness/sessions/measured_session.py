@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.sessions.gauges import Readings
+from wrist_stiffness.sessions.gauges import Gauges
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,9 @@ class MeasuredSession:
     # pose sensor's clock minus the joint states', estimate and one standard uncertainty, where the
     # motion tells it [s]
     clock_offset_s: tuple[float, float] | None = None
-    readings: Readings | None = None  # of dial gauges and inclinometers, (n, K), in place of poses
+    gauges: Gauges | None = None  # dial gauges and inclinometers in place of a sensor of poses
+    # (n, K), what they read less what they would of the rigid wrist [m] or [rad]; NaN = not read
+    readings: Array | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes."""
@@ -60,7 +62,7 @@ class MeasuredSession:
     def measured(self) -> NDArray[np.bool_]:
         """Which of the six components of each pose error, or readings, there are, (n, m)."""
         if self.readings is not None:
-            return np.isfinite(self.readings.values)
+            return np.isfinite(self.readings)
         turned = np.isfinite(self.rotation.sum(axis=(1, 2)))
         return np.hstack([np.isfinite(self.shift), np.repeat(turned[:, None], 3, axis=1)])
 
@@ -71,5 +73,5 @@ class MeasuredSession:
             block=self.block.take(rows),
             shift=self.shift[rows],
             rotation=self.rotation[rows],
-            readings=self.readings and self.readings.take(rows),
+            readings=None if self.readings is None else self.readings[rows],
         )

@@ -17,7 +17,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.sessions.gauges import Readings
+from wrist_stiffness.sessions.gauges import Gauges
 from wrist_stiffness.sessions.in_pieces import in_pieces
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.table_range import beyond_range
@@ -52,41 +52,32 @@ class UnitSession:
 
     name: str
     cut: Cut  # its units, and the moments that tell its path
-    # `shift`, `turn`: (u, 3), mean measured pose error of each unit against the rigid wrist: shift
-    # of O [m] and rotation vector [rad]; NaN = not measured
-    shift: Array
-    turn: Array
+    # (u, m), mean of what was measured of each unit against the rigid wrist: shift of O [m] and
+    # rotation vector [rad] of the platform, or readings of gauges; NaN = not measured
+    values: Array
     samples: Array  # (u,), measurements in each mean
     lost: int  # measurements left out as lost beams
     white: Array  # (m,), scatter of one measurement, NaN where it is not known [m, rad]
     # (m,), slow scatter beside it, which no mean over a dwell makes smaller: what the instrument
     # states beyond the white scatter, or what its digits hide where they hide that one [m, rad]
     wander: Array
-    # mean readings of gauges, (u, K), in place of `shift` and `turn`: then m is K, else 6
-    readings: Readings | None = None
+    gauges: Gauges | None = None  # what read them, in place of a sensor of poses: m is K, else 6
 
     def __len__(self) -> int:
         """Return the number of units."""
         return len(self.cut.dwell)
 
     @property
-    def values(self) -> Array:
-        """What was measured of each unit, (u, m): shift and turn, or readings."""
-        if self.readings is not None:
-            return self.readings.values
-        return np.concatenate([self.shift, self.turn], axis=1)
-
-    @property
     def quantities(self) -> tuple[Quantity, ...]:
         """Which of these are reported as one length."""
-        return QUANTITIES if self.readings is None else self.readings.quantities
+        return QUANTITIES if self.gauges is None else self.gauges.quantities
 
     @property
     def instruments(self) -> str:
         """What measured it, for a person."""
-        if self.readings is None:
+        if self.gauges is None:
             return "poses"
-        return f"gauges ({', '.join(each.name for each in self.readings.gauges)})"
+        return f"gauges ({', '.join(each.name for each in self.gauges.each)})"
 
     @cached_property
     def measured(self) -> Mask:
@@ -95,14 +86,9 @@ class UnitSession:
 
     def without(self, units: Labels) -> UnitSession:
         """Return the session with nothing measured in some of its units."""
-        blank = [self.shift.copy(), self.turn.copy()]
-        read = self.readings
-        if read is not None:
-            blank.append(read.values.copy())
-        for each in blank:
-            each[units] = np.nan
-        read = read and replace(read, values=blank[-1])
-        return replace(self, shift=blank[0], turn=blank[1], readings=read)
+        values = self.values.copy()
+        values[units] = np.nan
+        return replace(self, values=values)
 
     def seen(self, twist: Array) -> Array:
         """Return what the instrument shows of small twists at O, (..., u, 6) -> (..., u, m)."""
@@ -110,7 +96,7 @@ class UnitSession:
 
     def columns_seen(self, twists: Array) -> Array:
         """Return the same of columns of twists, (u, 6, k) -> (u, m, k)."""
-        return twists if self.readings is None else np.asarray(self._rows @ twists)
+        return twists if self.gauges is None else np.asarray(self._rows @ twists)
 
     @cached_property
     def common(self) -> Array:
@@ -119,27 +105,26 @@ class UnitSession:
         In motion the mean of that is not what they do at the mean angles: a ball a millimetre off
         goes along a bow.
         """
-        if self.readings is None:
+        if self.gauges is None:
             return np.empty((len(self), 6, 0))
-        return self.mean(self.readings.common(self.block.theta))
+        return self.mean(self.gauges.common(self.block.theta))
 
     def moves(self, gauge: str) -> bool:
         """Tell whether a gauge of this name followed motions of the rigid wrist."""
-        read = self.readings
-        if read is None:
+        if self.gauges is None:
             return False
-        rigid = read.rigid(self._theta)
+        rigid, up = self.gauges.rigid(self._theta), self.gauges.up
         return any(
-            each.name == gauge and each.follows(each.reading(np.zeros(3), rigid, read.up))
-            for each in read.gauges
+            each.name == gauge and each.follows(each.reading(np.zeros(3), rigid, up))
+            for each in self.gauges.each
         )
 
     @cached_property
     def _rows(self) -> Array:
         """By how much a twist changes each reading, (u, m, 6)."""
-        if self.readings is None:
+        if self.gauges is None:
             return np.broadcast_to(np.eye(6), (len(self), 6, 6))
-        return self.readings.rows(self._theta)
+        return self.gauges.rows(self._theta)
 
     @cached_property
     def _theta(self) -> Array:
@@ -183,10 +168,8 @@ class UnitSession:
         return replace(
             self,
             cut=self.cut.of_units(own),
-            shift=self.shift[own],
-            turn=self.turn[own],
+            values=self.values[own],
             samples=self.samples[own],
-            readings=self.readings and replace(self.readings, values=self.readings.values[own]),
         )
 
     def mean(self, values: Array) -> Array:
@@ -203,17 +186,18 @@ class UnitSession:
         Where gauges read, it is one that at the mean angles reads as all moments do on average.
         """
         mean = self.mean(twist)
-        if self.readings is None:
+        if self.gauges is None:
             return mean
-        shown = self.mean(self.readings.predicted(twist, self.block.theta))
-        off = shown - self.readings.predicted(mean, self._theta)
+        shown = self.mean(self.gauges.predicted(twist, self.block.theta))
+        off = shown - self.gauges.predicted(mean, self._theta)
         return np.asarray(mean + (np.linalg.pinv(self._rows) @ off[..., None])[..., 0])
 
     @cached_property
     def _turned(self) -> tuple[Mask, Array]:
         """Which units have a measured rotation, (u,), and the rotations (u, 3, 3)."""
-        known = np.asarray(np.isfinite(self.turn).all(axis=1))
-        return known, Rotation.from_rotvec(np.where(known[:, None], self.turn, 0.0)).as_matrix()
+        turn = self.values[:, 3:]
+        known = np.asarray(np.isfinite(turn).all(axis=1))
+        return known, Rotation.from_rotvec(np.where(known[:, None], turn, 0.0)).as_matrix()
 
     def residual(self, twist: Array) -> Array:
         """Return log(T_measured T_predicted^-1) at O in F, (..., u, 6) [m, rad].
@@ -221,16 +205,17 @@ class UnitSession:
         `twist` (..., u, 6): predicted pose error of each unit [m, rad].  Gives (..., u, m): of
         gauges what they read less what they should.
         """
-        if self.readings is not None:
-            return self.readings.values - self.readings.predicted(twist, self._theta)
+        if self.gauges is not None:
+            return self.values - self.gauges.predicted(twist, self._theta)
         rotation, shift = exp_twist(twist)
+        place = self.values[:, :3]
         known, measured = self._turned
         # Without a measured rotation the predicted one stands in: then s is compared with s.
         measured = np.where(known[:, None, None], measured, rotation)
         left = measured @ np.swapaxes(rotation, -1, -2)
-        moved = self.shift - (left @ shift[..., None])[..., 0]
+        moved = place - (left @ shift[..., None])[..., 0]
         out = log_motion(left, np.nan_to_num(moved))
-        out[..., :3][..., ~np.isfinite(self.shift)] = np.nan
+        out[..., :3][..., ~np.isfinite(place)] = np.nan
         out[..., ~known, 3:] = np.nan
         return out
 
@@ -259,8 +244,9 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         session.block.theta,
         session.rotation,
     )
-    read = session.readings
-    values = np.concatenate([session.shift, turn], axis=1) if read is None else read.values
+    values = session.readings
+    if values is None:
+        values = np.concatenate([session.shift, turn], axis=1)
     units = len(parts.dwell)
     lost = _lost(values, parts)
     stated = np.zeros(values.shape[1])
@@ -271,18 +257,16 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     steps = _steps(values, label, parts)
     white = _white(steps, stated)
     beside = np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2, 0.0))
-    none = np.full((units, 3), np.nan)
-    quantities = QUANTITIES if read is None else read.quantities
+    quantities = QUANTITIES if session.gauges is None else session.gauges.quantities
     return UnitSession(
         session.name,
         parts,
-        mean[:, :3] if read is None else none,
-        mean[:, 3:] if read is None else none,
+        mean,
         np.maximum(count.max(axis=1), 1.0),
         int(lost.sum()),
         white,
         np.maximum(beside, np.where(white == 0.0, _rounding(steps, quantities), 0.0)),
-        read and replace(read, values=mean),
+        session.gauges,
     )
 
 

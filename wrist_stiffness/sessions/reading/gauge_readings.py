@@ -13,7 +13,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording.samples import GaugeSamples
-from wrist_stiffness.sessions.gauges import Gauge, Readings
+from wrist_stiffness.sessions.gauges import Gauge, Gauges
 from wrist_stiffness.sessions.reading.signals import Stamps, last_of_equal
 
 GAUGES = "gauges"
@@ -43,8 +43,8 @@ ANGLES = (
 
 def gauge_readings(
     samples: GaugeSamples, notes: Mapping[str, Any], table: Table
-) -> tuple[Stamps, Readings]:
-    """Return readings as they were read, in the order of their stamps [ns].
+) -> tuple[Stamps, Gauges, Array]:
+    """Return stamps in their order [ns], the K gauges, and their readings (n, K) [m] or [rad].
 
     Raises `InputError` if no note says of what they are.
     """
@@ -62,20 +62,20 @@ def gauge_readings(
     gravity = table.geometry.gravity
     length = float(np.linalg.norm(gravity))
     up = -gravity / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-    values = samples.value[rows][:, columns]
-    return samples.time_ns[rows], Readings(gauges, table.mechanism, up, values)
+    own = Gauges(gauges, table.mechanism, up)
+    return samples.time_ns[rows], own, samples.value[rows][:, columns]
 
 
-def held_to(read: Readings, rotation: Array) -> tuple[Readings, list[str]]:
-    """Return readings less those of the rigid wrist, with the mountings that fit it, and remarks.
+def held_to(gauges: Gauges, values: Array, rotation: Array) -> tuple[Gauges, Array, list[str]]:
+    """Return gauges with mountings that fit the rigid wrist, what it leaves of readings, remarks.
 
-    `read`: of gauges as somebody measured where they stand; `rotation` (n, 3, 3): of the rigid
-    wrist.  Raises `InputError` if a reading has a wrong sign or unit, or nothing stands where it is
-    said to.
+    `gauges`: as somebody measured where they stand; `values` (n, K): their readings [m] or [rad];
+    `rotation` (n, 3, 3): of the rigid wrist.  Raises `InputError` if a reading has a wrong sign or
+    unit, or nothing stands where it is said to.
     """
-    up = read.up
+    up = gauges.up
     found, left, remarks = [], [], []
-    for each, own in zip(read.gauges, read.values.T, strict=True):
+    for each, own in zip(gauges.each, values.T, strict=True):
         seen = np.isfinite(own)
         if seen.any():
             _require_right(each, own[seen], each.reading(np.zeros(3), rotation[seen], up))
@@ -84,7 +84,7 @@ def held_to(read: Readings, rotation: Array) -> tuple[Readings, list[str]]:
             own = own - zero - each.reading(np.zeros(3), rotation, up)
         found.append(each)
         left.append(own)
-    return replace(read, gauges=tuple(found), values=np.stack(left, axis=1)), remarks
+    return replace(gauges, each=tuple(found)), np.stack(left, axis=1), remarks
 
 
 def _require_right(gauge: Gauge, values: Array, rigid: Array) -> None:

@@ -15,7 +15,7 @@ from wrist_stiffness.lookup.readout import MIN_SPREAD_RATIO
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
-from wrist_stiffness.sessions.gauges import Readings
+from wrist_stiffness.sessions.gauges import Gauges
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps, last_of_equal
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
@@ -48,7 +48,8 @@ class MeasuredTrack:
     remarks: tuple[str, ...] = ()  # what could not be used
     # all of this is in the axes of an instrument that stands anywhere, not in F
     unplaced: bool = False
-    readings: Readings | None = None  # (n, K), as they were read
+    gauges: Gauges | None = None
+    readings: Array | None = None  # (n, K), of the gauges [m] or [rad]; NaN = not read
 
     def __len__(self) -> int:
         """Return the number of stamps."""

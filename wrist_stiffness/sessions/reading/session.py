@@ -103,9 +103,11 @@ def read_session(
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
             track = pose_track(samples, table.geometry.platform.readout_points, known.frames)
         else:
-            time_ns, readings = gauge_readings(samples.gauges, notes, table)
+            time_ns, gauges, readings = gauge_readings(samples.gauges, notes, table)
             none = np.full((len(time_ns), 3, 4), np.nan)
-            track = MeasuredTrack(time_ns, none[:, :, 0], none[:, :, 1:], readings=readings)
+            track = MeasuredTrack(
+                time_ns, none[:, :, 0], none[:, :, 1:], gauges=gauges, readings=readings
+            )
         session = session_of(recording.path.name, machine, track, table)
     except (FrameError, InputError, RecordingError) as error:
         hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
@@ -154,7 +156,7 @@ def session_of(
     block = machine.at(all_ns)
     measured = block.take(rows)
     rigid = rigid_rotation(table, measured.theta)
-    covariance, readings = track.covariance, track.readings
+    covariance, gauges, readings = track.covariance, track.gauges, track.readings
     if track.unplaced:
         found = registered(shift, rotation, rigid)
         shift, rotation = found.in_base(shift, rotation)
@@ -162,9 +164,9 @@ def session_of(
         remarks.append(str(found))
     require_same_wrist(rotation, rigid, measured.theta, table)
     require_near(shift)
-    if readings is not None:
-        readings, said = held_to(readings.take(usable), rigid)
-        readings = replace(readings, values=_spread(readings.values, rows, len(block)))
+    if gauges is not None and readings is not None:
+        gauges, readings, said = held_to(gauges, readings[usable], rigid)
+        readings = _spread(readings, rows, len(block))
         remarks += said
     remarks += beyond_range(table, measured)
     meant = _rigid_when_measured(machine, time_ns, late, table, rigid)
@@ -185,6 +187,7 @@ def session_of(
         covariance,
         remarks=tuple(remarks),
         clock_offset_s=None if offset is None else (offset.seconds, offset.sigma),
+        gauges=gauges,
         readings=readings,
     )
     require_enough(session, len(track))
