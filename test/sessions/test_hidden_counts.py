@@ -21,7 +21,7 @@ def test_a_position_anywhere_within_a_count_turns_the_platform_as_told(table, mo
     step = table.geometry.limits.encoder_step
     shown = step * np.round(rng.uniform(-0.5, 0.5, (5, 2)) / step)
     dwells = Block(30.0 * np.arange(5.0), shown, np.zeros((5, 6)))
-    found = hidden_counts(table, [cut_of(table, dwells)], shown)
+    found = hidden_counts(table, cut_of(table, dwells), shown)
     true = np.repeat(shown[:, None], DRAWS, axis=1)
     true[:, :, motor] += step * rng.uniform(-0.5, 0.5, (5, DRAWS))
     forward = table.mechanism.forward

@@ -5,7 +5,7 @@ A recording is one large block, a live stream is blocks of one sample; so both a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -79,14 +79,18 @@ class Block:
 
     def take(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Block:
         """Return some of the samples, in their order."""
+        return self.each(lambda values: values[rows])
+
+    def each(self, function: Callable[[Array], Array]) -> Block:
+        """Return what a function along the samples makes of every signal."""
         return Block(
-            self.time[rows],
-            self.theta[rows],
-            self.load[rows],
-            None if self.theta_dot is None else self.theta_dot[rows],
+            function(self.time),
+            function(self.theta),
+            function(self.load),
+            None if self.theta_dot is None else function(self.theta_dot),
             self.load_on_platform,
-            {name: value[rows] for name, value in self.temperatures.items()},
-            {name: value[rows] for name, value in self.covariates.items()},
+            {name: function(value) for name, value in self.temperatures.items()},
+            {name: function(value) for name, value in self.covariates.items()},
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -265,4 +265,4 @@ def as_experiment(model: ErrorModel, session: MeasuredSession) -> Experiment:
     turned = np.any(np.abs(np.diff(parts.block.theta, axis=0)) > limit, axis=1)
     motions = np.append(0, np.cumsum(turned))[rows]
     visit = np.unique(motions, return_inverse=True)[1]
-    return Experiment(replace(parts.block, theta_dot=parts.speed), rows, visit, moving)
+    return Experiment(parts.block, rows, visit, moving)

@@ -15,15 +15,15 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.sessions.units import COUNTS, WINDOW_S, Cut, Labels
 
 
-def hidden_counts(table: Table, cuts: Sequence[Cut], theta: Array) -> Array:
+def hidden_counts(table: Table, cut: Cut, theta: Array) -> Array:
     """Return what a standard deviation of each motor's hidden part does to units, (u, 6, 2).
 
-    `theta` (u, 2): mean angles of all units [rad].
+    `theta` (u, 2): mean angles of the units [rad].
     """
     mechanism, step = table.mechanism, table.geometry.limits.encoder_step
     jacobian = np.zeros((len(theta), 6, 2))
     jacobian[:, 3:] = mechanism.jacobian(mechanism.forward(theta))
-    known = np.concatenate([counts_known(each, step) for each in cuts])
+    known = counts_known(cut, step)
     return np.asarray(jacobian * (step / np.sqrt(12.0 * known))[:, None, :])
 
 

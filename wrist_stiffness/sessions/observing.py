@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference import Observations, Quantity
@@ -32,8 +33,6 @@ class Observed:
     # (u, 6), predicted pose error of the units of all sessions, what the sensor would say [m, rad]
     predicted: Array
     observations: Observations  # residuals and conditions of all units
-    # tuple of (n,), for each session the row in the table of each measurement, -1 for none
-    unit: tuple[Labels, ...]
 
 
 def usual_wander(quantities: Sequence[Quantity]) -> Array:
@@ -76,81 +75,62 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
     of time, u units together; `predicted` (u, 6): pose error of the units, as the sensor would say
     it [m, rad].  Raises `InputError` if no unit was measured.
     """
-    units = [len(each) for each in sessions]
-    ends = np.cumsum(units)
-    parts = np.split(predicted, ends[:-1])
+    parts = np.split(predicted, np.cumsum([len(each) for each in sessions])[:-1])
     values = np.concatenate(
         [each.residual(part) for each, part in zip(sessions, parts, strict=True)]
     )
     used = np.isfinite(values).any(axis=1)
     if not used.any():
         raise InputError("no unit of the sessions was measured: every pose is blank")
-    theta = np.concatenate([each.mean(each.block.theta) for each in sessions])
-    cuts = [each.cut for each in sessions]
+    table = model.table
     counts = np.concatenate(
-        [
-            each.columns_seen(part)
-            for each, part in zip(
-                sessions, np.split(hidden_counts(model.table, cuts, theta), ends[:-1]), strict=True
-            )
-        ]
+        [each.columns_seen(hidden_counts(table, each.cut, each.still.theta)) for each in sessions]
     )
     covariance = _covariance(sessions, counts)
     observations = Observations(
         values,
         _covariates(sessions),
         covariance,
-        np.concatenate([each.mean(each.block.time) for each in sessions]),
-        np.repeat(np.arange(len(sessions)), units),
-        _replicates(model, sessions, theta),
+        np.concatenate([each.still.time for each in sessions]),
+        np.repeat(np.arange(len(sessions)), [len(each) for each in sessions]),
+        _replicates(sessions, table.geometry.limits.encoder_step),
         np.concatenate([each.samples for each in sessions]),
         sessions[0].quantities,
-        stand=stands_of(model.table, cuts),
+        stand=stands_of(table, [each.cut for each in sessions]),
         shared=None if covariance is None else counts,
         common=_common(sessions),
     )
-    row = np.where(used, np.cumsum(used) - 1, -1)
-    starts = ends - units
-    labels = tuple(
-        np.where(each.cut.label >= 0, row[start + each.cut.label], -1)
-        for each, start in zip(sessions, starts, strict=True)
-    )
-    kept = replace(observations.take(used), row=None)
-    return Observed(sessions, predicted, kept, labels)
+    return Observed(sessions, predicted, replace(observations.take(used), row=None))
 
 
 def _common(sessions: Sequence[UnitSession]) -> Array | None:
     """Return what the mountings of all sessions' gauges do to the units, (u, m, q)."""
-    own = [each.common for each in sessions]
-    total, first = sum(each.shape[2] for each in own), 0
-    if not total:
+    if sessions[0].gauges is None:
         return None
-    out = []
-    for each in own:
-        last = first + each.shape[2]
-        out.append(np.pad(each, ((0, 0), (0, 0), (first, total - last))))
-        first = last
-    return np.concatenate(out)
+    flat = block_diag(*(each.common.reshape(-1, each.common.shape[2]) for each in sessions))
+    return np.asarray(flat.reshape(-1, sessions[0].values.shape[1], flat.shape[1]))
 
 
 def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
     """Return the conditions of each unit by name."""
     columns: list[dict[str, Array]] = []
     for each in sessions:
-        block, parts = each.block, each.cut
-        load = each.mean(block.load)
+        still, cut = each.still, each.cut
+        motors = {
+            "theta": still.theta,
+            "approach": each.mean(cut.sense[cut.kept]),
+            "speed": np.zeros_like(still.theta) if still.theta_dot is None else still.theta_dot,
+        }
         own = {
-            **{f"theta_{i + 1}": each.mean(block.theta[:, i]) for i in range(2)},
-            **{f"approach_{i + 1}": each.mean(parts.sense[parts.kept, i]) for i in range(2)},
-            **{f"speed_{i + 1}": each.mean(parts.speed[:, i]) for i in range(2)},
-            **dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), load.T, strict=True)),
-            "force": np.linalg.norm(load[:, :3], axis=1),
-            "moment": np.linalg.norm(load[:, 3:], axis=1),
-            "held_s": each.mean(parts.held_s[parts.kept]),
-            "loaded_at_rest": np.rint(each.mean(parts.at_rest[parts.kept].astype(float))),
-            "time_s": each.mean(block.time),
-            **{f"T_{name}": each.mean(value) for name, value in block.temperatures.items()},
-            **{name: each.mean(value) for name, value in block.covariates.items()},
+            **{f"{name}_{i + 1}": both[:, i] for name, both in motors.items() for i in range(2)},
+            **dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), still.load.T, strict=True)),
+            "force": np.linalg.norm(still.load[:, :3], axis=1),
+            "moment": np.linalg.norm(still.load[:, 3:], axis=1),
+            "held_s": each.mean(cut.held_s[cut.kept]),
+            "loaded_at_rest": np.rint(each.mean(cut.at_rest[cut.kept].astype(float))),
+            "time_s": still.time,
+            **{f"T_{name}": value for name, value in still.temperatures.items()},
+            **still.covariates,
         }
         columns.append(own)
     common = [name for name in columns[0] if all(name in own for own in columns)]
@@ -163,35 +143,30 @@ def _covariance(sessions: tuple[UnitSession, ...], counts: Array) -> Array | Non
     seen = np.concatenate([each.values for each in sessions])
     if np.isnan(white[:, np.isfinite(seen).any(axis=0)]).any():
         return None
-    variance = np.nan_to_num(white, nan=1.0) ** 2
     own = np.concatenate(
         [
-            own / each.samples[:, None] + each.wander**2
-            for own, each in zip(variance, sessions, strict=True)
+            np.nan_to_num(each.white, nan=1.0) ** 2 / each.samples[:, None] + each.wander**2
+            for each in sessions
         ]
     )
     return np.asarray(counts @ np.swapaxes(counts, -1, -2) + own[:, :, None] * np.eye(own.shape[1]))
 
 
-def _replicates(model: ErrorModel, sessions: tuple[UnitSession, ...], theta: Array) -> Labels:
+def _replicates(sessions: tuple[UnitSession, ...], step: float) -> Labels:
     """Return the number of the condition that each dwell repeats after a new approach, -1 else."""
-    step = model.table.geometry.limits.encoder_step
-    labels = []
-    number, start = 0, 0
+    labels, number = [], 0
     for each in sessions:
-        units = len(each)
-        pose, load = theta[start : start + units], each.mean(each.block.load)
+        pose, load, dwell = each.still.theta, each.still.load, each.cut.dwell
         range_ = np.repeat([np.linalg.norm(load[:, i : i + 3], axis=1).max() for i in (0, 3)], 3)
-        own = np.full(units, -1)
-        for i in np.flatnonzero(each.cut.dwell):
+        own = np.full(len(each), -1)
+        for i in np.flatnonzero(dwell):
             if own[i] >= 0:
                 continue
-            alike = each.cut.dwell & (own < 0)
+            alike = dwell & (own < 0)
             alike &= (np.abs(pose - pose[i]) <= SAME_POSE_COUNTS * step).all(axis=1)
             alike &= (np.abs(load - load[i]) <= SAME_LOAD * range_ + 1e-12).all(axis=1)
             if alike.sum() > 1:
                 own[alike] = number
                 number += 1
         labels.append(own)
-        start += units
     return np.concatenate(labels)

@@ -113,7 +113,7 @@ class UnitSession:
         """Tell whether a gauge of this name followed motions of the rigid wrist."""
         if self.gauges is None:
             return False
-        rigid, up = self.gauges.rigid(self._theta), self.gauges.up
+        rigid, up = self.gauges.rigid(self.still.theta), self.gauges.up
         return any(
             each.name == gauge and each.follows(each.reading(np.zeros(3), rigid, up))
             for each in self.gauges.each
@@ -124,12 +124,7 @@ class UnitSession:
         """By how much a twist changes each reading, (u, m, 6)."""
         if self.gauges is None:
             return np.broadcast_to(np.eye(6), (len(self), 6, 6))
-        return self.gauges.rows(self._theta)
-
-    @cached_property
-    def _theta(self) -> Array:
-        """Mean angles of the units, (u, 2) [rad]."""
-        return self.mean(self.block.theta)
+        return self.gauges.rows(self.still.theta)
 
     @property
     def block(self) -> Block:
@@ -139,17 +134,7 @@ class UnitSession:
     @cached_property
     def still(self) -> Block:
         """Mean signals of the units, for effects without a memory."""
-        mean, block = self.mean, self.block
-        speed = np.zeros_like(block.theta) if block.theta_dot is None else block.theta_dot
-        return Block(
-            mean(block.time),
-            mean(block.theta),
-            mean(block.load),
-            mean(speed),
-            block.load_on_platform,
-            {name: mean(value) for name, value in block.temperatures.items()},
-            {name: mean(value) for name, value in block.covariates.items()},
-        )
+        return self.block.each(self.mean)
 
     @cached_property
     def known(self) -> dict[Any, Any]:
@@ -189,7 +174,7 @@ class UnitSession:
         if self.gauges is None:
             return mean
         shown = self.mean(self.gauges.predicted(twist, self.block.theta))
-        off = shown - self.gauges.predicted(mean, self._theta)
+        off = shown - self.gauges.predicted(mean, self.still.theta)
         return np.asarray(mean + (np.linalg.pinv(self._rows) @ off[..., None])[..., 0])
 
     @cached_property
@@ -206,7 +191,7 @@ class UnitSession:
         gauges what they read less what they should.
         """
         if self.gauges is not None:
-            return self.values - self.gauges.predicted(twist, self._theta)
+            return self.values - self.gauges.predicted(twist, self.still.theta)
         rotation, shift = exp_twist(twist)
         place = self.values[:, :3]
         known, measured = self._turned

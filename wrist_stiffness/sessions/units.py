@@ -63,10 +63,7 @@ class Cut:
     unit: Labels  # (k,), unit of each kept sample, -1 for none
     weight: Array  # (k,), its share of the unit's mean; the shares of a unit add up to 1
     held_s: Array  # (n,), time since anything changed [s]
-    # `speed`, `mean_speed`: (k, 2), motor speeds at the kept samples, and their means over a window
-    # around each [rad/s]
-    speed: Array
-    mean_speed: Array
+    mean_speed: Array  # (k, 2), means of motor speeds over a window around kept samples [rad/s]
     at_rest: Mask  # (n,), whether the load changed after the last motion rather than before it
     sense: Array  # (n, 2), sign of each motor's last motion, 0 before the first
 
@@ -80,7 +77,6 @@ class Cut:
             block=self.block.take(used),
             unit=self.unit[used],
             weight=self.weight[used],
-            speed=self.speed[used],
             mean_speed=self.mean_speed[used],
         )
 
@@ -128,7 +124,6 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
         unit,
         _weights(block.time[kept], unit, dwell),
         held_s,
-        np.where(resting[kept, None], 0.0, speed[kept]),
         np.where(resting[kept, None], 0.0, mean_speed[kept]),
         last_load > last_turn,
         sense,
