@@ -43,7 +43,7 @@ from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.cdr import decode, encode
 from wrist_stiffness.recording.fixed_layout import FixedReader
 from wrist_stiffness.recording.messages import MESSAGE_TYPES
-from wrist_stiffness.sessions.reading.gauges_file import read_gauges
+from wrist_stiffness.sessions.gauges import read_gauges
 
 PROJECT = Path(__file__).parents[1]
 SLOW_S, LARGE_BYTES = 2.0, 500 << 20

@@ -27,7 +27,7 @@ from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.commands.node_list import LAUNCH_ARGUMENTS
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.planning.loads_file import read_loads
-from wrist_stiffness.sessions.reading.gauges_file import read_gauges
+from wrist_stiffness.sessions.gauges import read_gauges
 from wrist_stiffness.shipped import shipped_file
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.sessions.hidden_counts import hidden_counts, stands_of
+from wrist_stiffness.sessions.observing import hidden_counts, stands_of
 from wrist_stiffness.sessions.units import cut
 
 DRAWS = 4000

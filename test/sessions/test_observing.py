@@ -10,9 +10,8 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.columns import SessionModel
-from wrist_stiffness.sessions.hidden_counts import counts_known
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import observe, predict_units
+from wrist_stiffness.sessions.observing import counts_known, observe, predict_units
 from wrist_stiffness.sessions.unit_session import as_units
 
 POSES_DEG = ((0, 0), (20, 10), (-15, 25), (20, 10))

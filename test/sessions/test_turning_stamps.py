@@ -6,8 +6,7 @@ from wrist_stiffness.commands.export_csv import export_csv
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.sessions.observing import observe
-from wrist_stiffness.sessions.reading.path import turning_stamps
-from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.reading.session import read_session, turning_stamps
 from wrist_stiffness.sessions.reading.signals import Signal
 from wrist_stiffness.shipped import shipped_file
 

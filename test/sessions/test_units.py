@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.sessions.hidden_counts import _stands
+from wrist_stiffness.sessions.observing import _stands
 from wrist_stiffness.sessions.units import MOST_MOVING, PATH_S, UNIT_S, cut
 
 STEP = np.radians(0.015)

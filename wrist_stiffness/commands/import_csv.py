@@ -37,6 +37,7 @@ from wrist_stiffness.recording.messages import (
     WrenchStamped,
 )
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
+from wrist_stiffness.sessions.gauges import gauge_of, read_gauges
 from wrist_stiffness.sessions.reading.csv_columns import (
     GAUGE_FACTORS,
     LOAD,
@@ -51,7 +52,6 @@ from wrist_stiffness.sessions.reading.csv_columns import (
     reader_of,
 )
 from wrist_stiffness.sessions.reading.gauge_readings import GAUGES
-from wrist_stiffness.sessions.reading.gauges_file import gauge_of, read_gauges
 from wrist_stiffness.sessions.reading.pose_track import LEAST_MARKERS
 from wrist_stiffness.topics import BASE_FRAME
 

@@ -10,18 +10,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.inference import Quantity
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference import Quantity as Reported
+from wrist_stiffness.inputs.document import Node, read_yaml
+from wrist_stiffness.inputs.schema import Quantity, list_of, record, text, vector, version
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.sessions.in_pieces import in_pieces
 
-GAUGES = Quantity("gauges", "um", (), 1e6)
-TILTS = Quantity("tilts", "mdeg", (), 180e3 / np.pi)
+GAUGES = Reported("gauges", "um", (), 1e6)
+TILTS = Reported("tilts", "mdeg", (), 180e3 / np.pi)
 
 MOVES_M, MOVES_RAD = 5e-5, 1e-3
 """Motion of the rigid wrist, RMS, from which a wrong sign or unit shows in it: far above what
@@ -33,6 +37,9 @@ ZERO_M, ZERO_RAD = 0.02, 0.1
 POINT_M, DIRECTION_RAD = 1e-3, np.radians(2.0)
 """Standard deviations with which a ball's place and a direction are known, as a ruler and a square
 tell them (assumed)."""
+
+LENGTHS, ANGLES = ("mm", "um", "in"), ("deg", "mdeg")
+"""Units of their columns."""
 
 STEP = 1e-4
 """Of differences, in [m], [rad] and standard deviations of a mounting: curvature and rounding are
@@ -117,7 +124,7 @@ class Gauges:
     up: Array  # (3,), unit vector against gravity in F
 
     @cached_property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reported, ...]:
         """What is reported as one length: dial gauges together, and inclinometers."""
         tilts = tuple(n for n, each in enumerate(self.each) if each.point is None)
         lengths = tuple(n for n in range(len(self.each)) if n not in tilts)
@@ -172,3 +179,44 @@ def cleared(values: Array, common: Array, sigma: Array) -> Array:
     target = (np.where(known, columns, 0.0) / sigma[:, None]).reshape(len(flat), -1)
     taken = np.linalg.solve(flat.T @ flat + np.eye(flat.shape[1]), flat.T @ target)
     return np.asarray((columns - common @ taken).reshape(values.shape))
+
+
+def _direction(node: Node) -> Array:
+    """Read a direction of any length (3,), and return its unit vector."""
+    along = vector()(node)
+    length = float(np.linalg.norm(along))
+    if length == 0.0:
+        raise node.refuse("is no direction: all three numbers are 0")
+    return np.asarray(along / length)
+
+
+GAUGE = record({"column": text(), "direction": _direction}, {"point_mm": Quantity(vector())})
+FILE = record({"schema": version(1), "gauges": list_of(lambda node: node, at_least=1)})
+
+
+def gauge_of(column: str) -> str:
+    """Return the name of a column without its unit."""
+    return column.rpartition("_")[0]
+
+
+def read_gauges(path: str | Path) -> dict[str, Gauge]:
+    """Read which gauge reads which column, in the file's order (InputError if it is wrong)."""
+    found: dict[str, Gauge] = {}
+    for node in FILE(read_yaml(path, InputError))["gauges"]:
+        column, gauge = _gauge(node)
+        if gauge.name in (known.name for known in found.values()):
+            raise node["column"].refuse(f"{gauge.name!r} is there twice")
+        found[column] = gauge
+    return found
+
+
+def _gauge(node: Node) -> tuple[str, Gauge]:
+    own = GAUGE(node)
+    name, _, unit = own["column"].rpartition("_")
+    if not name or unit not in (*LENGTHS, *ANGLES):
+        ends = ", ".join(f"_{each}" for each in (*LENGTHS, *ANGLES))
+        raise node["column"].refuse(f"{own['column']!r} is no name with its unit ({ends})")
+    if (unit in LENGTHS) != ("point" in own):
+        what = "a dial gauge needs a" if unit in LENGTHS else "an inclinometer has no"
+        raise node.refuse(f"{own['column']}: {what} point_mm")
+    return own["column"], Gauge(name, own["direction"], own.get("point"))

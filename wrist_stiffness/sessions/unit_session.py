@@ -19,8 +19,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import Gauges
 from wrist_stiffness.sessions.in_pieces import in_pieces
-from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.table_range import beyond_range
+from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
 from wrist_stiffness.sessions.units import Cut, Labels, Mask, cut
 
 QUANTITIES = (
@@ -256,15 +255,13 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
 
 
 def _means(values: Array, label: Labels, units: int) -> tuple[Array, Array]:
-    mean, count = np.full((2, units, values.shape[1]), np.nan)
+    """Return means (u, m) of what was measured (n, m), NaN for none, and of how many, (u, m)."""
+    total, count = np.zeros((2, units, values.shape[1]))
     for column, each in enumerate(values.T):
         good = np.isfinite(each) & (label >= 0)
         count[:, column] = np.bincount(label[good], minlength=units)
-        total = np.bincount(label[good], each[good], minlength=units)
-        mean[:, column] = np.where(
-            count[:, column] > 0, total / np.maximum(count[:, column], 1.0), np.nan
-        )
-    return mean, count
+        total[:, column] = np.bincount(label[good], each[good], minlength=units)
+    return np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0), count
 
 
 def _lost(values: Array, parts: Cut) -> Mask:

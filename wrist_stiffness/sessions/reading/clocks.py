@@ -71,8 +71,8 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
     own = 1e-9 * (rigid.time_ns - rigid.time_ns[0])
     continuous = _continuous(rigid.values)
     slope = np.diff(continuous, axis=0) / np.diff(own)[:, None]
-    began, ended = (Rotation.from_matrix(measured[rows]).as_quat() for rows in (first, second))
-    turned = _angle(_nearest_sign(began, ended), ended)
+    began, ended = (Rotation.from_matrix(measured[rows]) for rows in (first, second))
+    turned = (ended * began.inv()).magnitude()
     if len(first) < BLOCKS * LEAST_IN_BLOCK or np.sqrt(np.mean(turned**2)) < LEAST_MOTION:
         return None
 
@@ -115,11 +115,6 @@ def _angle(first: Array, second: Array) -> Array:
     """Return the angle between quaternions (n, 4) of like sign [rad]."""
     half_chord = 0.5 * np.linalg.norm(second - first, axis=1)
     return np.asarray(4.0 * np.arcsin(np.minimum(half_chord, 1.0)))
-
-
-def _nearest_sign(quaternion: Array, other: Array) -> Array:
-    """Return quaternions (n, 4) with the sign in which they are nearer to others."""
-    return np.where(np.sum(quaternion * other, axis=1) < 0.0, -1.0, 1.0)[:, None] * quaternion
 
 
 def _continuous(quaternion: Array) -> Array:

@@ -11,7 +11,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import rotation_vector
-from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.mechanism.vectors import block_diagonal, vee
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 
 POSES_USED = 1000
@@ -174,13 +174,13 @@ class Registration:
 
     def __str__(self) -> str:
         """Say where the instrument stands, to be checked in the cell."""
-        cosine = np.clip(0.5 * (np.trace(self.instrument) - 1.0), -1.0, 1.0)
+        turn = np.degrees(Rotation.from_matrix(self.instrument).magnitude())
         stand, sits = (
             ", ".join(f"{1e3 * each:.0f}" for each in place) for place in (-self.origin, self.place)
         )
         return (
             f"the instrument was registered by angles and poses: it stands at ({stand}) mm in "
-            f"wrist_base, turned by {np.degrees(np.arccos(cosine)):.1f} deg, and its target sits "
+            f"wrist_base, turned by {turn:.1f} deg, and its target sits "
             f"at ({sits}) mm on the platform"
         )
 
@@ -200,15 +200,7 @@ def registered(shift: Array, rotation: Array, rigid: Array) -> Registration:
         )
     seen, said = rotation[known], rigid[known]
     instrument, target = (each.as_matrix() for each in turns_of(seen, said))
-    swing = said @ said[0].T
-    axes = np.stack(
-        [
-            swing[:, 2, 1] - swing[:, 1, 2],
-            swing[:, 0, 2] - swing[:, 2, 0],
-            swing[:, 1, 0] - swing[:, 0, 1],
-        ],
-        axis=1,
-    )  # twice the sine about each axis
+    axes = vee(said @ said[0].T)  # twice the sine about each axis
     spread = np.linalg.svd(axes, compute_uv=False) / (2.0 * np.sqrt(len(axes)))
     misfit = agreement(seen, said).misfit_turned
     if spread[1] <= misfit:

@@ -27,12 +27,11 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
-from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
 from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings, held_to
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
-from wrist_stiffness.sessions.reading.path import GAP_S, turning_stamps
 from wrist_stiffness.sessions.reading.pose_track import MeasuredTrack, pose_track
 from wrist_stiffness.sessions.reading.refusals import (
     require_enough,
@@ -44,7 +43,6 @@ from wrist_stiffness.sessions.reading.refusals import (
 from wrist_stiffness.sessions.reading.registration import registered
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps
 from wrist_stiffness.sessions.reading.static_frames import frames_of
-from wrist_stiffness.sessions.table_range import beyond_range
 from wrist_stiffness.topics import MOTOR_COMMANDS
 
 GEOMETRY = "geometry_sha256"
@@ -61,6 +59,9 @@ OWN_CLOCK_PERIODS = 5.0
 
 OWN_CLOCK_GAIN = 4.0
 """An offset that divides the mean square of the misfit by less is not believed."""
+
+GAP_S = 0.2
+"""Poses that are nearer to each other tell the path themselves [s]."""
 
 TURN_STEPS = 1.5
 """In encoder steps: a smaller swing between two poses is the chatter of a count."""
@@ -197,6 +198,9 @@ def session_of(
 def path_stamps(machine: MachineSignals, time_ns: Stamps, table: Table) -> Stamps:
     """Return the stamps that tell the way to the first pose and between poses far apart.
 
+    Friction, backlash and creep remember that way.  Between the poses of a machine that measures at
+    rest, or where the tracker was blind, the measured stamps alone do not tell it.
+
     `time_ns` (n,) int64: stamps of measured poses, rising [ns].  Gives (p,) int64: where angles or
     load turned back [ns].
     """
@@ -211,6 +215,32 @@ def path_stamps(machine: MachineSignals, time_ns: Stamps, table: Table) -> Stamp
     found = np.union1d(np.union1d(turns, pulls), time_ns[:1])
     found = found[machine.usable(found)[0]]
     return found[table.mechanism.reachable(machine.angles.interpolated(found))]
+
+
+def turning_stamps(signal: Signal, time_ns: Stamps, least: Array) -> Stamps:
+    """Return the stamps of the extremes of a signal inside the gaps between poses.
+
+    Of each gap only the outermost extremes count: smaller swings inside them are forgotten by play
+    and friction as well.
+
+    `signal`: values (m, k); `time_ns` (n,) int64: stamps of the poses, rising [ns]; `least` (k,):
+    an extreme stands out by more than this from the values at both ends of its gap.  Gives (p,)
+    int64: rising [ns].
+    """
+    ends = signal.interpolated(np.clip(time_ns, signal.time_ns[0], signal.time_ns[-1]))
+    after = np.searchsorted(signal.time_ns, time_ns, side="right")
+    found = [
+        signal.time_ns[rows][np.argmax(sign * signal.values[rows, column])]
+        for gap in np.flatnonzero(np.diff(time_ns) > round(GAP_S * NANOSECONDS))
+        if after[gap] < after[gap + 1]
+        for rows in [slice(after[gap], after[gap + 1])]
+        for sign in (1.0, -1.0)
+        for column in np.flatnonzero(
+            np.max(sign * signal.values[rows], axis=0)
+            > np.max(sign * ends[gap : gap + 2], axis=0) + least
+        )
+    ]
+    return np.unique(np.array(found, dtype=np.int64))
 
 
 def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
