@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,13 +21,14 @@ from wrist_stiffness.comparing.wiring import (
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
 from wrist_stiffness.identification.free_effects import answering_as
+from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference.noise import replicate_variance
 from wrist_stiffness.inference.settings import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import Observed
 from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
-from wrist_stiffness.sessions.repeatability import by_side, repeatability
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 Prepared = tuple[Observed, Explained, tuple[str, ...]]
@@ -34,6 +36,9 @@ Prepared = tuple[Observed, Explained, tuple[str, ...]]
 VERY_STRONG = 5.0
 """Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
 """
+
+FEWEST_REPEATS = 6
+"""Degrees of freedom from which a repeatability is told."""
 
 
 def compare_models(
@@ -163,3 +168,27 @@ def _gain(before: Calibration, after: Calibration) -> float:
     counts = [len(each.point.left) for each in found]
     first, second = (each.log / count for each, count in zip(found, counts, strict=True))
     return (second - first) * min(counts)
+
+
+def by_side(observations: Observations) -> Observations:
+    """Return the table with replicates only of dwells that both motors approached alike."""
+    if observations.replicate is None:
+        return observations
+    sides = [np.sign(observations.covariate(f"approach_{motor}")) for motor in (1, 2)]
+    keys = np.column_stack([observations.replicate, *sides])
+    _, label = np.unique(keys, axis=0, return_inverse=True)
+    return replace(observations, replicate=np.where(observations.replicate >= 0, label, -1))
+
+
+def repeatability(observations: Observations) -> dict[str, float]:
+    """Scatter (RMS) of repeated dwells by the key of the quantity; empty with too few."""
+    values = np.where(observations.measured, observations.values, 0.0)
+    variance, freedom = replicate_variance(values, np.empty((*values.shape, 0)), observations)
+    if freedom < FEWEST_REPEATS:
+        return {}
+    # Of a component that was never measured the variance is called 1, which is a metre.
+    variance = np.where(observations.measured.any(axis=0), variance, 0.0)
+    return {
+        q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
+        for q in observations.reported
+    }

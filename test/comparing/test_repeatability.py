@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness.comparing.compare import by_side, repeatability
 from wrist_stiffness.comparing.comparison import sizes
-from wrist_stiffness.sessions.repeatability import by_side, repeatability
 
 
 def along(component, values):
