@@ -247,6 +247,4 @@ def nanoseconds(text: str) -> int:
 
 def seconds(time_ns: int) -> str:
     """Return a stamp [ns] as seconds, all digits and no more."""
-    whole, rest = divmod(abs(time_ns), 1_000_000_000)
-    decimals = f".{rest:09d}".rstrip("0") if rest else ""
-    return f"{'-' if time_ns < 0 else ''}{whole}{decimals}"
+    return f"{Decimal(time_ns).scaleb(-9).normalize():f}"

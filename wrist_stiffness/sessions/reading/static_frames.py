@@ -31,23 +31,8 @@ class KnownFrames:
 
     frames: Frames  # all of them
     # transforms that cannot be used, or that contradict an earlier one
-    remarks: tuple[str, ...] = ()
-    # frames on `/tf_static` that nothing ties to `wrist_base` or `wrist_platform`
-    elsewhere: tuple[str, ...] = ()
-
-    @property
-    def hints(self) -> tuple[str, ...]:
-        """What may be the reason where a frame is not known."""
-        told = (*self.remarks, "--parameters FILE can tell where a sensor's frame stands")
-        if not self.elsewhere:
-            return told
-        names = ", ".join(self.elsewhere[:MOST_NAMED])
-        more = ", ..." if len(self.elsewhere) > MOST_NAMED else ""
-        return (
-            *told,
-            f"{TF_STATIC} ties these to one another but not to {BASE_FRAME} or {PLATFORM_FRAME}: "
-            f"{names}{more}",
-        )
+    remarks: tuple[str, ...]
+    hints: tuple[str, ...]  # what may be the reason where a frame is not known
 
 
 def frames_of(recording: Recording, remaps: Mapping[str, str], mapped: Frames) -> KnownFrames:
@@ -58,8 +43,9 @@ def frames_of(recording: Recording, remaps: Mapping[str, str], mapped: Frames) -
     recording says.
     """
     topic = remaps.get(TF_STATIC, TF_STATIC)
+    told = "--parameters FILE can tell where a sensor's frame stands"
     if topic not in {info.name for info in recording.topics}:
-        return KnownFrames(mapped)
+        return KnownFrames(mapped, (), (told,))
     found: dict[str, StaticTransform] = {}
     remarks: dict[str, None] = {}
     for _, _, message in recording.messages([topic]):
@@ -79,7 +65,14 @@ def frames_of(recording: Recording, remaps: Mapping[str, str], mapped: Frames) -
     sensors = {**sensor_frames(found.values()), **mapped.sensors}
     named = {name for step in found.values() for name in (step.parent, step.child)}
     elsewhere = sorted(named - {BASE_FRAME, PLATFORM_FRAME, *sensors})
-    return KnownFrames(Frames(sensors), tuple(remarks), tuple(elsewhere))
+    hints = [*remarks, told]
+    if elsewhere:
+        hints.append(
+            f"{TF_STATIC} ties these to one another but not to {BASE_FRAME} or {PLATFORM_FRAME}: "
+            + ", ".join(elsewhere[:MOST_NAMED])
+            + (", ..." if len(elsewhere) > MOST_NAMED else "")
+        )
+    return KnownFrames(Frames(sensors), tuple(remarks), tuple(hints))
 
 
 def _same(one: StaticTransform, other: StaticTransform) -> bool:
