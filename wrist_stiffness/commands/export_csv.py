@@ -19,7 +19,6 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import rigid_rotation
 from wrist_stiffness.sessions.reading.csv_columns import (
@@ -37,11 +36,8 @@ from wrist_stiffness.sessions.reading.csv_columns import (
 from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings
 from wrist_stiffness.sessions.reading.machine_signals import machine_signals
 from wrist_stiffness.sessions.reading.pose_track import base_transform, measured_components
-from wrist_stiffness.sessions.reading.refusals import require_topics
-from wrist_stiffness.sessions.reading.session import notes_of, path_stamps
+from wrist_stiffness.sessions.reading.session import notes_of, opened, path_stamps
 from wrist_stiffness.sessions.reading.signals import Stamps, last_of_equal
-from wrist_stiffness.sessions.reading.static_frames import frames_of
-from wrist_stiffness.topics import MOTOR_COMMANDS
 
 ROWS_A_REPORT = 1000
 
@@ -85,12 +81,8 @@ def export_csv(
     settings = settings or StreamSettings()
     output = Path(output)
     _require_place(output, overwrite)
-    source = open_recording(recording)
-    joints = (settings.motors.motor_1, settings.motors.motor_2)
-    samples = read_samples(source, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
-    require_topics(source, samples, remaps or {})
+    source, samples, known = opened(recording, remaps or {}, settings)
     notes, _ = notes_of(samples)
-    known = frames_of(source, remaps or {}, settings.frames)
     try:
         machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):

@@ -25,6 +25,7 @@ from wrist_stiffness.errors import FrameError, InputError, RecordingError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.recording import open_recording, read_samples
+from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
@@ -42,7 +43,7 @@ from wrist_stiffness.sessions.reading.refusals import (
 )
 from wrist_stiffness.sessions.reading.registration import registered
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps
-from wrist_stiffness.sessions.reading.static_frames import frames_of
+from wrist_stiffness.sessions.reading.static_frames import KnownFrames, frames_of
 from wrist_stiffness.topics import MOTOR_COMMANDS
 
 GEOMETRY = "geometry_sha256"
@@ -93,12 +94,8 @@ def read_session(
     are left, or they are those of another wrist.
     """
     settings = settings or StreamSettings()
-    joints = settings.motors.motor_1, settings.motors.motor_2
-    recording = open_recording(path)
-    samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
-    require_topics(recording, samples, remaps or {})
+    recording, samples, known = opened(path, remaps or {}, settings)
     notes, unread = notes_of(samples)
-    known = frames_of(recording, remaps or {}, settings.frames)
     try:
         machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
@@ -118,6 +115,20 @@ def read_session(
     other = _another_geometry(notes, table)
     said = (*damage, *unread, *other, *known.remarks, *faults, *session.remarks)
     return replace(session, notes=notes, remarks=said)
+
+
+def opened(
+    path: str | Path, remaps: Mapping[str, str], settings: StreamSettings
+) -> tuple[Recording, Samples, KnownFrames]:
+    """Return a recording with angles, loads and measurements, these, and its sensor frames.
+
+    Raises `RecordingError` if it cannot be read or lacks a topic.
+    """
+    recording = open_recording(path)
+    joints = settings.motors.motor_1, settings.motors.motor_2
+    samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
+    require_topics(recording, samples, remaps)
+    return recording, samples, frames_of(recording, remaps, settings.frames)
 
 
 def session_of(
