@@ -57,7 +57,7 @@ def test_a_few_of_the_units_are_the_same_on_the_same_path(model, session):
     measured = np.flatnonzero(whole.measured)
     assert (rows[0], len(rows), rows[-1]) == (measured[0], 3, measured[-1])
     np.testing.assert_array_equal(times[rows], own)
-    for name in ("shift", "turn", "samples"):
+    for name in ("values", "samples"):
         np.testing.assert_array_equal(getattr(few, name), getattr(whole, name)[rows])
     assert few.block is whole.block
     assert predict_units(model, few).tolist() == predict_units(model, whole)[rows].tolist()

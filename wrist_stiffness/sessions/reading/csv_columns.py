@@ -47,9 +47,9 @@ DATE = re.compile(
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
-TURN_DEG = 360.0
-LARGEST_LOAD = 10_000.0
-"""No wrist carries a tonne [N, N m]."""
+LIMITS = {**dict.fromkeys(MOTORS, (-360.0, 360.0)), **dict.fromkeys(LOAD, (-1e4, 1e4))}
+"""Beyond these, in the column's unit, no wrist is: a wrong unit or a slip.  None carries a tonne.
+Those of a certain wrist are its table's, and looked at where recordings are read."""
 
 TEMPERATURES_DEGC = (-273.15, 1000.0)
 
@@ -177,7 +177,9 @@ def reader_of(column: str, factors: Mapping[str, Decimal] = FACTORS) -> Callable
     """
     unit = column.rpartition("_")[2]
     factor = factors.get(unit)
-    lower, upper = _possible(column)
+    lower, upper = LIMITS.get(column, (-inf, inf))
+    if TEMPERATURE.fullmatch(column):
+        lower, upper = TEMPERATURES_DEGC
 
     def read(text: str) -> float:
         try:
@@ -191,18 +193,6 @@ def reader_of(column: str, factors: Mapping[str, Decimal] = FACTORS) -> Callable
         return float(exact if factor is None else EXACT.multiply(exact, factor))
 
     return read
-
-
-def _possible(column: str) -> tuple[float, float]:
-    """Return the limits, in the column's unit, beyond which no wrist is: a wrong unit or a slip.
-
-    Those of a certain wrist are its table's, and looked at where recordings are read.
-    """
-    if column in MOTORS:
-        return -TURN_DEG, TURN_DEG
-    if column in LOAD:
-        return -LARGEST_LOAD, LARGEST_LOAD
-    return TEMPERATURES_DEGC if TEMPERATURE.fullmatch(column) else (-inf, inf)
 
 
 def writer_of(column: str) -> Callable[[float], str]:
