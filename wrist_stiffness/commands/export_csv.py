@@ -90,7 +90,7 @@ def export_csv(
             gauges: tuple[str, ...] = ()
         else:
             time_ns, own, measured = gauge_readings(samples.gauges, notes, table)
-            gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in own.each)
+            gauges = tuple(f"{g.name}_{'deg' if g.point is None else 'mm'}" for g in own.members)
             names, markers = (), 0
     except FrameError as error:
         raise FrameError("; ".join([f"{source.path}: {error}", *known.hints])) from error

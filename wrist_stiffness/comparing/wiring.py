@@ -61,7 +61,7 @@ class Mistake:
         cut = replace(session.cut, block=self.block(session.block))
         factor = np.repeat([self.shift_factor, 1.0], 3)
         if session.gauges is not None:
-            turned = [each.name == self.gauge for each in session.gauges.each]
+            turned = [each.name == self.gauge for each in session.gauges.members]
             factor = np.where(turned, -1.0, 1.0)
         return replace(session, cut=cut, values=factor * session.values)
 
@@ -177,7 +177,7 @@ def suspected(
     """
     before, count = left.error, _independent(left.observations)
     gauges = observed.sessions[0].gauges
-    mistakes = (*mistakes, *(map(_turned, gauges.each) if gauges is not None else ()))
+    mistakes = (*mistakes, *(map(_turned, gauges.members) if gauges is not None else ()))
 
     def gains(mistake: Mistake) -> dict[str, float]:
         """Return the logarithm of its likelihood against that of none, by quantity."""

@@ -79,9 +79,9 @@ class Block:
 
     def take(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Block:
         """Return some of the samples, in their order."""
-        return self.each(lambda values: values[rows])
+        return self.mapped(lambda values: values[rows])
 
-    def each(self, function: Callable[[Array], Array]) -> Block:
+    def mapped(self, function: Callable[[Array], Array]) -> Block:
         """Return what a function along the samples makes of every signal."""
         return Block(
             function(self.time),

@@ -119,17 +119,17 @@ def _slopes(function: Callable[[Array], Array], count: int) -> Array:
 class Gauges:
     """All gauges of a session."""
 
-    each: tuple[Gauge, ...]  # K of them, as they stand
+    members: tuple[Gauge, ...]  # K of them, as they stand
     mechanism: Mechanism
     up: Array  # (3,), unit vector against gravity in F
 
     @cached_property
     def quantities(self) -> tuple[Reported, ...]:
         """What is reported as one length: dial gauges together, and inclinometers."""
-        tilts = tuple(n for n, each in enumerate(self.each) if each.point is None)
-        lengths = tuple(n for n in range(len(self.each)) if n not in tilts)
+        tilts = tuple(n for n, each in enumerate(self.members) if each.point is None)
+        lengths = tuple(n for n in range(len(self.members)) if n not in tilts)
         return tuple(
-            replace(quantity, components=own, called=tuple(self.each[n].name for n in own))
+            replace(quantity, components=own, called=tuple(self.members[n].name for n in own))
             for quantity, own in ((GAUGES, lengths), (TILTS, tilts))
             if own
         )
@@ -145,7 +145,7 @@ class Gauges:
         rotation = rotation @ rigid
         changes = [
             each.reading(shift, rotation, self.up) - each.reading(np.zeros(3), rigid, self.up)
-            for each in self.each
+            for each in self.members
         ]
         return np.stack(changes, axis=-1)
 
@@ -156,7 +156,7 @@ class Gauges:
     def common(self, theta: Array) -> Array:
         """Return what standard deviations of all mountings do to the readings, (n, K, q)."""
         rotation = self.rigid(theta)
-        own = [each.mounting(rotation, self.up) for each in self.each]
+        own = [each.mounting(rotation, self.up) for each in self.members]
         ends = np.cumsum([each.shape[1] for each in own])
         out = np.zeros((len(theta), len(own), ends[-1]))
         for number, (each, end) in enumerate(zip(own, ends, strict=True)):

@@ -76,7 +76,7 @@ class UnitSession:
         """What measured it, for a person."""
         if self.gauges is None:
             return "poses"
-        return f"gauges ({', '.join(each.name for each in self.gauges.each)})"
+        return f"gauges ({', '.join(each.name for each in self.gauges.members)})"
 
     @cached_property
     def measured(self) -> Mask:
@@ -115,7 +115,7 @@ class UnitSession:
         rigid, up = self.gauges.rigid(self.still.theta), self.gauges.up
         return any(
             each.name == gauge and each.follows(each.reading(np.zeros(3), rigid, up))
-            for each in self.gauges.each
+            for each in self.gauges.members
         )
 
     @cached_property
@@ -133,7 +133,7 @@ class UnitSession:
     @cached_property
     def still(self) -> Block:
         """Mean signals of the units, for effects without a memory."""
-        return self.block.each(self.mean)
+        return self.block.mapped(self.mean)
 
     @cached_property
     def known(self) -> dict[Any, Any]:

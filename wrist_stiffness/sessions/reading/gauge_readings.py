@@ -75,7 +75,7 @@ def held_to(gauges: Gauges, values: Array, rotation: Array) -> tuple[Gauges, Arr
     """
     up = gauges.up
     found, left, remarks = [], [], []
-    for each, own in zip(gauges.each, values.T, strict=True):
+    for each, own in zip(gauges.members, values.T, strict=True):
         seen = np.isfinite(own)
         if seen.any():
             _require_right(each, own[seen], each.reading(np.zeros(3), rotation[seen], up))
@@ -84,7 +84,7 @@ def held_to(gauges: Gauges, values: Array, rotation: Array) -> tuple[Gauges, Arr
             own = own - zero - each.reading(np.zeros(3), rotation, up)
         found.append(each)
         left.append(own)
-    return replace(gauges, each=tuple(found)), np.stack(left, axis=1), remarks
+    return replace(gauges, members=tuple(found)), np.stack(left, axis=1), remarks
 
 
 def _require_right(gauge: Gauge, values: Array, rigid: Array) -> None:
