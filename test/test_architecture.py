@@ -46,7 +46,8 @@ LIBRARIES_USED = {
     "fem": ROBOT | {"netgen", "skfem", "pymetis"},
     "cli": ROBOT | {"tqdm"},  # the extra `progress`
     "ros": ROBOT | {"rclpy", "builtin_interfaces"},
-    "web": ROBOT | {"nicegui"},  # the extra `web`; Plotly's JavaScript comes with it
+    # the extra `web`; Starlette and Plotly's JavaScript come with it
+    "web": ROBOT | {"nicegui", "starlette"},
 }
 DRAWING = "matplotlib"
 

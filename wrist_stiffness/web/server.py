@@ -8,7 +8,6 @@ from multiprocessing.forkserver import ensure_running, set_forkserver_preload
 from typing import Any
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.web.gate import LOOPBACK, Gate
 from wrist_stiffness.web.workspace import Workspace
 
 TITLE = "Wrist workbench"
@@ -34,6 +33,7 @@ def serve(folder: str, host: str, port: int, largest_mb: int, browser: bool) -> 
     ensure_running()
     from nicegui import app, ui
 
+    from wrist_stiffness.web.gate import LOOPBACK, Gate
     from wrist_stiffness.web.page import build_page
 
     workspace = Workspace(folder)
