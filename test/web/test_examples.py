@@ -45,11 +45,11 @@ def test_a_fault_on_no_list_is_told_as_such_and_the_error_falls_by_the_proposed_
     bench, calibrated, found = opened("unknown_fault", tmp_path)
     assert found["diagnosis"].verdict == "unknown"
     assert found["diagnosis"].findings == ()
-    law = found["offers"][0]
-    assert "theta_1" in law.formula
-    assert "theta_2" in law.formula
-    place = "proposed", law.component, direction_of(law.way.split())
-    candidate = FormulaEffect(*place, law.formula, {})
+    _, law = found["offers"][0]
+    assert "theta_1" in law["formula"]
+    assert "theta_2" in law["formula"]
+    place = "proposed", law["component"], direction_of(law["direction"].split())
+    candidate = FormulaEffect(*place, law["formula"], {})
     seen, left = bench.look_at(candidate)["seen"], calibrated["view"][1].left
     shift = left.reported[0]
     assert rms(left.values - seen.change, shift) < 0.6 * rms(left.values, shift)

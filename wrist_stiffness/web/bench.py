@@ -6,8 +6,10 @@ import shlex
 import signal
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event
 from pathlib import Path
@@ -31,7 +33,6 @@ from wrist_stiffness.comparing.comparison import Comparison
 from wrist_stiffness.comparing.curve import Curve
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.errors import InputError, WristError
-from wrist_stiffness.identification.proposal import Proposal
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis
 from wrist_stiffness.inference.giving import told
 from wrist_stiffness.mechanism.components import Array
@@ -59,6 +60,8 @@ RIVALS = 2
 """Other proposed laws that are shown."""
 
 SHIPPED = "config/palmieri2015_model.yaml"
+
+CANCELLED = "cancelled"
 
 Changes = dict[str, Any]
 """What a call changed of what a tab shows, by the names of `tab.Tab`."""
@@ -89,22 +92,6 @@ class Seen:
     check: str
     change: Array  # (u, 6), what it takes away of each unit [m, rad]
     parameters: Mapping[str, float]  # as fitted
-
-
-@dataclass(frozen=True)
-class Offer:
-    """A law that is proposed where no effect of the catalogue explains the error."""
-
-    # `sentence`, `formula`, `component`, `way`: what it does, and the same as `extend --formula`
-    # takes it
-    sentence: str
-    formula: str
-    component: str
-    way: str
-    probability: float  # that it is the one; of another beside the first, that both are
-    # the law itself, another beside it, or one in place of the first: only the first and those in
-    # its place exclude each other, and only their probabilities add up to at most 1
-    role: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,12 +193,12 @@ class Bench:
         """Ask what is missing."""
         self._tell("asking which effect is missing")
         self._answer = self._opened.rank()
-        found, offers = self._answer.proposals, []
+        offers, found = [], self._answer.proposals
         if found:
-            first, beside = found.terms[:1], found.terms[1:]
-            offers += [_offer(law, "Proposed") for law in first]
-            offers += [_offer(law, "Or in its place") for law in found.rivals[:RIVALS]]
-            offers += [_offer(law, "And once the first is added") for law in beside]
+            # Only the first and those in its place exclude each other.
+            offers += [("Proposed", law.as_values()) for law in found.terms[:1]]
+            offers += [("Or in its place", law.as_values()) for law in found.rivals[:RIVALS]]
+            offers += [("And once the first is added", law.as_values()) for law in found.terms[1:]]
         return {"diagnosis": self._answer.diagnosis, "offers": tuple(offers), "seen": None}
 
     def look_at(self, candidate: str | FormulaEffect) -> Changes:
@@ -336,50 +323,35 @@ def _row(version: Version) -> Row:
     return Row(version.name, dict(version.held_out), version.warnings, values)
 
 
-def _offer(law: Proposal, role: str) -> Offer:
-    return Offer(law.sentence, law.formula, law.component, law.way, law.probability, role)
-
-
 def _depends(found: Comparison) -> Depends:
     explained = found.models[0].explained
     curves = {each.name: each.curve for each in explained.told if len(each.curve.names) == 1}
     return Depends(sentences(explained), curves, explained.not_varied, found.mistake)
 
 
-class Stopped(WristError):
-    """Somebody cancelled what was being done."""
-
-
 def work(folder: Path, wires: Connection, stop: Event) -> None:
     """Do what is asked over a connection until that is closed.
 
-    `wires`: takes (method, arguments); answers ("told", words), ("done", done, total), and at the
-    end ("good", changes) or ("bad", sentence).
+    `wires`: takes (method, arguments); answers (words or None, steps done, steps in all) any number
+    of times, and at the end (changes, sentence), which says why it failed or is empty.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    def tell(text: str) -> None:
-        _check()
-        wires.send(("told", text))
-
-    def progress(done: int, total: int) -> None:
-        _check()
-        wires.send(("done", done, total))
-
-    def _check() -> None:
+    def tell(words: str | None, done: int = 0, total: int = 0) -> None:
         if stop.is_set():
-            raise Stopped("cancelled")
+            raise WristError(CANCELLED)
+        wires.send((words, done, total))
 
-    bench = Bench(folder, tell, progress)
-    while True:
-        try:
+    bench = Bench(folder, tell, partial(tell, None))
+    with suppress(EOFError):
+        while True:
             method, arguments = wires.recv()
-        except EOFError:
-            return
-        try:
-            wires.send(("good", getattr(bench, method)(*arguments)))
-        except WristError as error:
-            wires.send(("bad", str(error)))
-        except Exception as error:
-            traceback.print_exc()
-            wires.send(("bad", f"An error of the program, written to its terminal: {error!r}"))
+            changes, why = {}, ""
+            try:
+                changes = getattr(bench, method)(*arguments)
+            except WristError as error:
+                why = str(error)
+            except Exception as error:
+                traceback.print_exc()
+                why = f"An error of the program, written to its terminal: {error!r}"
+            wires.send((changes, why))

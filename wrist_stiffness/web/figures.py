@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import View
-from wrist_stiffness.comparing.curve import Curve, condition_label, condition_shown
+from wrist_stiffness.comparing.curve import ANGLES, Curve, condition_label, condition_shown
 from wrist_stiffness.inference.observations import Labels, Mask, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.report.page import number, typeset
 from wrist_stiffness.report.pictures.figure import COLOURS, FLOOR
 from wrist_stiffness.web.bench import Row
 
@@ -23,17 +24,19 @@ AXES = ("x", "y", "z")
 DRAWN = 3000
 """Points from which a picture is drawn by the graphics card: an hour of motion at half a second."""
 
-SYMBOL = {"s": "s", "phi": "φ", "gauges": "gauges", "tilts": "tilts"}
 MAP = "Cividis"
 """Perceptually even, and the same to people of any colour vision."""
 
 UNITS = "units"
 """Marks the traces that are selected by point."""
 
-UNNAMED = {"showlegend": False}
+LEGEND = {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0}
 
 REMOVED = ("zoom2d", "zoomIn2d", "zoomOut2d", "autoScale2d")
 """Buttons on a picture of what the wheel and a double click do: Tab would stop at each."""
+
+LOWER = {"yaxis": "y2", "showlegend": False}
+"""Of traces in the lower of two plots."""
 
 BREAK_MIN = 0.3
 """Gap between two recordings on one axis of time."""
@@ -56,7 +59,18 @@ class Shown:
     @property
     def unit(self) -> str:
         """As people write it."""
-        return unit_of(self.quantity)
+        return spelled(self.quantity.unit)
+
+    @property
+    def label(self) -> str:
+        """Of an axis of the length of the quantity."""
+        return f"{spelled(self.quantity.name)} [{self.unit}]"
+
+    def fall(self, quantity: Quantity, chosen: Mask | None = None) -> str:
+        """Return what is left of a quantity in the chosen units, and after, RMS with the unit."""
+        left = [self.view.left.values, *([] if self.after is None else [self.after])]
+        sizes = " → ".join(number(rms(each, quantity, chosen)) for each in left)
+        return f"{sizes} {spelled(quantity.unit)}"
 
     def part(self, values: Array) -> Array:
         """Return the component that is shown of (u, 6) values, in the unit of the quantity."""
@@ -65,22 +79,13 @@ class Shown:
     @property
     def part_label(self) -> str:
         """Of an axis of a picture."""
-        if self.quantity.name not in ("s", "phi"):
-            return f"{self.quantity.name}, number {self.axis + 1} [{self.unit}]"
         word = "along" if self.quantity.name == "s" else "about"
-        return f"{SYMBOL[self.quantity.name]} {word} {AXES[self.axis]} [{self.unit}]"
-
-
-def unit_of(quantity: Quantity) -> str:
-    """Return the unit of a quantity as people write it."""
-    return spelled(quantity.unit)
+        return f"{spelled(self.quantity.name)} {word} {AXES[self.axis]} [{self.unit}]"
 
 
 def spelled(text: str) -> str:
     """Return text for the page, with one spelling of units; names such as `size_um` stay."""
-    for plain, shown in (("um", "µm"), ("phi", "φ")):
-        text = re.sub(rf"\b{plain}\b", shown, text)
-    return text.replace("+-", "±")
+    return re.sub(r"\bphi\b", "φ", typeset(text))
 
 
 def length(values: Array, quantity: Quantity) -> Array:
@@ -115,45 +120,36 @@ def minutes(table: Observations) -> Array:
 def error_map(shown: Shown, border: Array) -> Figure:
     """Return the error over both motor angles, with the workspace's border (n, 2) [rad]."""
     table = shown.view.left
-    left = table.values if shown.after is None else shown.after
-    size = length(left, shown.quantity)
-    angles = np.degrees(_angles(table))
+    size = length(table.values if shown.after is None else shown.after, shown.quantity)
+    one, two = (np.degrees(table.covariate(name)) for name in ANGLES)
     edge = np.degrees(border)
-    text = f"{SYMBOL[shown.quantity.name]} [{shown.unit}]"
-    points = {
-        "type": _kind(table.n_units),
-        "mode": "markers",
-        "meta": UNITS,
-        "name": "averaged poses",
-        "x": angles[:, 0],
-        "y": angles[:, 1],
-        "marker": {
-            "color": size,
-            "colorscale": MAP,
-            "cmin": 0.0,
-            "cmax": shown.scale,
-            "size": 8,
-            "line": {"width": 0.5, "color": "white"},
-            "colorbar": {"title": {"text": text, "side": "right"}, "thickness": 12},
-        },
-        "hovertemplate": f"motors %{{x:.1f}}°, %{{y:.1f}}°: %{{marker.color:.3g}} {shown.unit}"
-        "<extra></extra>",
-        "unselected": {"marker": {"opacity": 0.12}},
-        **_selected(shown),
+    points = _dots(one, two, "averaged poses", "", shown)
+    points["marker"] = {
+        "color": size,
+        "colorscale": MAP,
+        "cmin": 0.0,
+        "cmax": shown.scale,
+        "size": 8,
+        "line": {"width": 0.5, "color": "white"},
+        "colorbar": {"title": {"text": shown.label, "side": "right"}, "thickness": 12},
     }
-    outline = {
+    told = f"motors %{{x:.1f}}°, %{{y:.1f}}°: %{{marker.color:.3g}} {shown.unit}"
+    points["hovertemplate"] = f"{told}<extra></extra>"
+    outline = _line(edge[:, 0], edge[:, 1], "operative border", FLOOR, ())
+    outline |= {"line": {"color": FLOOR, "width": 1.5, "dash": "dash"}, "hoverinfo": "name"}
+    ring = {
         "type": "scatter",
-        "mode": "lines",
-        "name": "operative border",
-        "x": edge[:, 0],
-        "y": edge[:, 1],
-        "line": {"color": FLOOR, "width": 1.5, "dash": "dash"},
+        "mode": "markers",
+        "name": "the moment that is looked at",
+        "x": one[[shown.moment]],
+        "y": two[[shown.moment]],
+        "marker": {"symbol": "circle-open", "size": 16, "color": RED, "line": {"width": 3}},
         "hoverinfo": "name",
+        "selectedpoints": [0],
     }
-    ring = _ring(angles[shown.moment, 0], angles[shown.moment, 1])
-    figure = _figure([points, outline, ring], "motor angle 1 [deg]", "motor angle 2 [deg]", "map")
     x, y = edge[np.argmax(edge[:, 1])]
     word = {"x": x, "y": y, "text": "operative workspace", "showarrow": False, "yshift": 9}
+    figure = _figure([points, outline, ring], "motor angle 1 [deg]", "motor angle 2 [deg]", "map")
     figure["layout"] |= {"dragmode": "lasso", "showlegend": False, "annotations": [word]}
     figure["layout"]["yaxis"] |= {"scaleanchor": "x"}
     return figure
@@ -166,25 +162,22 @@ def time_line(shown: Shown) -> Figure:
     measured, predicted = shown.part(view.measured), shown.part(view.predicted)
     left = shown.part(table.values)
     traces = [
-        _dots(time, measured, "measured", FLOOR, shown, size=4),
+        _dots(time, measured, "measured", FLOOR, shown, 4),
         _line(time, predicted, "predicted", BLUE, breaks),
-        _dots(time, left, "left", BLUE, shown, "y2", 4) | UNNAMED,
+        _dots(time, left, "left", BLUE, shown, 4) | LOWER,
     ]
     if shown.after is not None:
         after = shown.part(shown.after)
-        with_it = predicted + left - after
-        traces.insert(2, _line(time, with_it, shown.name, RED, breaks))
-        traces.append(_dots(time, after, "left", RED, shown, "y2", 4) | UNNAMED)
-    label = f"{SYMBOL[shown.quantity.name]} [{shown.unit}]"
-    figure = _figure(traces, "time [min]", label, "time")
-    at = float(time[shown.moment])
-    cut = {"type": "line", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1}
+        traces.insert(2, _line(time, predicted + left - after, shown.name, RED, breaks))
+        traces.append(_dots(time, after, "left", RED, shown, 4) | LOWER)
+    figure = _figure(traces, "time [min]", shown.label, "time")
+    cut = {"color": FLOOR, "width": 1, "dash": "dot"}
     figure["layout"] |= {
         "dragmode": "select",
         "selectdirection": "h",
         "hovermode": "closest",
-        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
-        "shapes": [{**cut, "line": {"color": FLOOR, "width": 1, "dash": "dot"}}],
+        "legend": LEGEND,
+        "shapes": [_upright(float(time[shown.moment]), cut)],
     }
     figure["layout"]["yaxis"] |= {"domain": [0.5, 1.0]}
     figure["layout"]["yaxis2"] = {**_axis(f"remaining [{shown.unit}]"), "domain": [0.0, 0.4]}
@@ -196,7 +189,7 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
     """Return what is left against one condition, with the law that the comparison found."""
     table, part, label = shown.view.left, shown.part, shown.part_label
     if told is not None and len(told.measured) == table.n_units:
-        label = f"{SYMBOL[told.quantity.name]} {told.where} [{unit_of(told.quantity)}]"
+        label = spelled(f"{told.quantity.name} {told.where} [{told.quantity.unit}]")
         part = told.along
     else:
         told = None
@@ -208,11 +201,7 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
         traces = [_dots(values, told.measured, "remaining error", BLUE, shown)]
         traces.append(_line(told.places[:, 0], told.mean, "fitted law", RED, ()))
     figure = _figure(traces, condition_label(condition), label, condition)
-    figure["layout"] |= {
-        "dragmode": "lasso",
-        "showlegend": True,
-        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
-    }
+    figure["layout"] |= {"dragmode": "lasso", "showlegend": True, "legend": LEGEND}
     return figure
 
 
@@ -221,7 +210,7 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     sizes = [each.held_out.get(quantity.key, np.nan) for each in versions]
     # The first one stands wherever instrument and target were put: it says nothing of the wrist.
     top = 1.25 * max(sizes[1:] or sizes)
-    unit = unit_of(quantity)
+    unit = spelled(quantity.unit)
     bars = {
         "type": "bar",
         "meta": UNITS,
@@ -234,15 +223,14 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
         "marker": {"color": ["#9ca3af"] + [BLUE] * (len(sizes) - 2) + [GREEN]},
         "hoverinfo": "skip",
     }
-    label = f"held-out {SYMBOL[quantity.name]} [{unit}]"
+    label = f"held-out {spelled(quantity.name)} [{unit}]"
     figure = _figure([bars], label, "", f"versions {len(versions)}")
     floor = noise.get(quantity.key, 0.0)
-    line = {"type": "line", "x0": floor, "x1": floor, "yref": "paper", "y0": 0, "y1": 1}
     word = {"x": floor, "y": 1.0, "yref": "paper", "yanchor": "bottom", "showarrow": False}
     word |= {"xanchor": "left" if floor < 0.6 * top else "right"}
     figure["layout"] |= {
         "showlegend": False,
-        "shapes": [{**line, "line": {"color": FLOOR, "width": 2, "dash": "dash"}}],
+        "shapes": [_upright(floor, {"color": FLOOR, "width": 2, "dash": "dash"})],
         "annotations": [{**word, "text": f"goal: noise floor {number(floor)} {unit}"}],
     }
     figure["layout"]["xaxis"] |= {"range": [0.0, top]}
@@ -250,28 +238,8 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     return figure
 
 
-def _angles(table: Observations) -> Array:
-    return np.stack([table.covariate("theta_1"), table.covariate("theta_2")], axis=1)
-
-
-def number(value: float) -> str:
-    """Return three digits, thousands without a power of ten."""
-    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
-def _kind(count: int) -> str:
-    return "scatter" if count <= DRAWN else "scattergl"
-
-
-def _selected(shown: Shown) -> Figure:
-    if shown.chosen is None:
-        return {}
-    return {"selectedpoints": np.flatnonzero(shown.chosen).tolist()}
-
-
-def _dots(
-    x: Array, y: Array, name: str, colour: str, shown: Shown, yaxis: str = "y", size: int = 6
-) -> Figure:
+def _dots(x: Array, y: Array, name: str, colour: str, shown: Shown, size: int = 6) -> Figure:
+    chosen = {} if shown.chosen is None else {"selectedpoints": np.flatnonzero(shown.chosen)}
     return {
         "type": _kind(len(x)),
         "mode": "markers",
@@ -279,10 +247,9 @@ def _dots(
         "name": name,
         "x": x,
         "y": y,
-        "yaxis": yaxis,
         "marker": {"color": colour, "size": size, "opacity": 0.75},
         "unselected": {"marker": {"opacity": 0.1}},
-        **_selected(shown),
+        **chosen,
     }
 
 
@@ -297,18 +264,12 @@ def _line(x: Array, y: Array, name: str, colour: str, breaks: Sequence[int] | La
     }
 
 
-def _ring(x: float, y: float) -> Figure:
-    marker = {"symbol": "circle-open", "size": 16, "color": RED, "line": {"width": 3}}
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "the moment that is looked at",
-        "x": [x],
-        "y": [y],
-        "marker": marker,
-        "hoverinfo": "name",
-        "selectedpoints": [0],
-    }
+def _kind(count: int) -> str:
+    return "scatter" if count <= DRAWN else "scattergl"
+
+
+def _upright(x: float, line: Figure) -> Figure:
+    return {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0, "y1": 1, "line": line}
 
 
 def _axis(title: str) -> Figure:

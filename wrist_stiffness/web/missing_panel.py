@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import groupby
+from typing import Any
 
 from nicegui import ui
 
@@ -13,8 +14,8 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.model.formula_law import FORMULA_PLACES, SIGNALS
 from wrist_stiffness.report.diagnosis_report import verdict_lines
-from wrist_stiffness.web.bench import Offer, Seen
-from wrist_stiffness.web.figures import SYMBOL, number, rms, spelled, unit_of
+from wrist_stiffness.web.bench import Seen
+from wrist_stiffness.web.figures import spelled
 from wrist_stiffness.web.tab import DEPENDS, VERSIONS, Tab
 
 FIRST = 12
@@ -66,8 +67,8 @@ class MissingPanel:
 
     def _proposals(self) -> None:
         """Offer the laws that are proposed where nothing on the list fits."""
-        for law in self._tab.offers:
-            text = f"{law.role} ({percent(law.probability)}): {spelled(law.sentence)}"
+        for role, law in self._tab.offers:
+            text = f"{role} ({percent(law['probability'])}): {spelled(law['sentence'])}"
             offer = ui.button(on_click=partial(self._formula.propose, law))
             offer.props("outline dense align=left").classes("w-full")
             with offer:
@@ -135,10 +136,7 @@ class MissingPanel:
             ui.label(f"If {seen.name} were added").classes("font-bold")
             ui.label(f"{seen.sentence}.").classes("text-sm")
             for quantity in tab.quantities:
-                sizes = (rms(each, quantity) for each in (shown.view.left.values, shown.after))
-                path = " → ".join(map(number, sizes))
-                text = f"{SYMBOL[quantity.name]}: {path} {unit_of(quantity)}"
-                ui.label(f"{text} on these data")
+                ui.label(f"{spelled(quantity.name)}: {shown.fall(quantity)} on these data")
             for name, value in seen.parameters.items():
                 ui.label(f"{name} = {value:.3g}").classes("text-sm")
             if seen.check:
@@ -193,11 +191,11 @@ class FormulaForm:
             self._look.classes("w-full mt-1")
         self._check()
 
-    def propose(self, law: Offer) -> None:
+    def propose(self, law: dict[str, Any]) -> None:
         """Fill the form with a law that was proposed."""
-        self._formula.set_value(law.formula)
-        self._place.set_value(law.component)
-        self._way.set_value(law.way)
+        self._formula.set_value(law["formula"])
+        self._place.set_value(law["component"])
+        self._way.set_value(law["direction"])
         self._name.set_value("proposed")
         self._form.set_value(True)
         ui.run_javascript(f"getHtmlElement({self._look.id}).scrollIntoView({{block: 'nearest'}})")

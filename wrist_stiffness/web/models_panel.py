@@ -6,8 +6,8 @@ from functools import partial
 
 from nicegui import events, ui
 
-from wrist_stiffness.report.page import plus_minus
-from wrist_stiffness.web.figures import SYMBOL, number, spelled, unit_of
+from wrist_stiffness.report.page import number, plus_minus
+from wrist_stiffness.web.figures import spelled
 from wrist_stiffness.web.tab import VERSIONS, Tab
 
 
@@ -57,7 +57,7 @@ class ModelsPanel:
             with button, ui.column().classes("w-full gap-0 items-start text-left px-1"):
                 ui.label(f"{place}  {version.name}").classes("font-bold")
                 sizes = ", ".join(
-                    f"{SYMBOL[q.name]} {number(version.held_out[q.key])} {unit_of(q)}"
+                    spelled(f"{q.name} {number(version.held_out[q.key])} {q.unit}")
                     for q in tab.quantities
                 )
                 note = " (instrument not registered)" if place == 0 else ""

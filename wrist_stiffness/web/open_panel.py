@@ -8,9 +8,10 @@ import numpy as np
 from nicegui import events, run, ui
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.report.page import number
 from wrist_stiffness.sessions.contents import Contents
 from wrist_stiffness.web.examples import EXAMPLES
-from wrist_stiffness.web.figures import SYMBOL, number, spelled
+from wrist_stiffness.web.figures import spelled
 from wrist_stiffness.web.tab import Tab
 
 SHIPPED = "shipped model"
@@ -107,8 +108,7 @@ class OpenPanel:
 def _told(each: Contents) -> dict[str, str]:
     """Return what a recording holds, in words."""
     (low_1, high_1), (low_2, high_2) = np.degrees(each.angles)
-    left = [key.rpartition("_") for key in each.registered]
-    sizes = zip(left, each.registered.values(), strict=True)
+    sizes = [(*key.split("_"), number(size)) for key, size in each.registered.items()]
     return {
         "recording": each.name,
         "duration": f"{each.duration_s / 60.0:.1f} min",
@@ -119,8 +119,6 @@ def _told(each: Contents) -> dict[str, str]:
         "speed": f"up to {np.degrees(each.speed[1]):.0f} deg/s",
         "load": f"{each.force[0]:.2f} to {each.force[1]:.2f} N",
         "instrument": each.instrument,
-        "registered to": ", ".join(
-            f"{SYMBOL[name]} {number(size)} {spelled(unit)}" for (name, _, unit), size in sizes
-        ),
+        "registered to": ", ".join(spelled(f"{name} {size} {unit}") for name, unit, size in sizes),
         "other signals": ", ".join(each.signals) or "none",
     }

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.sessions.contents import Contents
-from wrist_stiffness.web.bench import Changes, Depends, Offer, Row, Seen, work
+from wrist_stiffness.web.bench import CANCELLED, Changes, Depends, Row, Seen, work
 from wrist_stiffness.web.figures import Shown, length, rms, strongest
 from wrist_stiffness.web.workspace import Workspace
 
@@ -36,40 +35,28 @@ FORKS = get_context("forkserver")
 
 
 class Worker:
-    """A process that does the long work of one tab."""
+    """A process that does the long work of one tab; one that only looks around needs none."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._stop = FORKS.Event()
+        self._folder, self._stop = folder, FORKS.Event()
         self._process: BaseProcess | None = None
-        self._wires: Connection | None = None
-
-    def _begun(self) -> Connection:
-        """Return the wires to the process: a page that only looks around needs none."""
-        if self._wires is None:
-            self._wires, theirs = FORKS.Pipe()
-            self._process = FORKS.Process(
-                target=work, args=(self._folder, theirs, self._stop), daemon=True
-            )
-            self._process.start()
-            theirs.close()
-        return self._wires
 
     def call(
-        self, told: Callable[[tuple[Any, ...]], None], method: str, *arguments: object
+        self, told: Callable[[str | None, int, int], None], method: str, *arguments: object
     ) -> tuple[Changes, str]:
         """Do one thing and return what it changed, and why it failed, empty if it did not."""
         self._stop.clear()
         try:
-            wires = self._begun()
-            wires.send((method, arguments))
-            while True:
-                kind, *rest = wires.recv()
-                if kind == "good":
-                    return rest[0], ""
-                if kind == "bad":
-                    return {}, str(rest[0])
-                told((kind, *rest))
+            if self._process is None:
+                self._wires, theirs = FORKS.Pipe()
+                own = self._folder, theirs, self._stop
+                self._process = FORKS.Process(target=work, args=own, daemon=True)
+                self._process.start()
+                theirs.close()
+            self._wires.send((method, arguments))
+            while len(answer := self._wires.recv()) > 2:
+                told(*answer)
+            return answer
         except (EOFError, OSError):
             return {}, "The process behind this page ended; load the page again."
 
@@ -79,7 +66,7 @@ class Worker:
 
     def end(self) -> None:
         """End the process."""
-        if self._process is not None and self._wires is not None:
+        if self._process is not None:
             self._process.terminate()
             self._wires.close()
 
@@ -101,7 +88,8 @@ class Tab:
         self.views: dict[int, View] = {}
         self.depends: dict[int, Depends] = {}
         self.diagnosis: Diagnosis | None = None
-        self.offers: tuple[Offer, ...] = ()
+        # role and values of laws that are proposed where no effect of the catalogue explains all
+        self.offers: tuple[tuple[str, dict[str, Any]], ...] = ()
         self.seen: Seen | None = None
         self.covariates: tuple[str, ...] = ()
         self.planned = "", ""
@@ -146,16 +134,14 @@ class Tab:
             self.draw()
         self.busy, self.words, self.calls = False, "", self.calls + 1
         with self._client:
-            if why == "cancelled":
+            if why == CANCELLED:
                 ui.notify("Cancelled. Nothing was changed.")
             elif why:
                 ui.notify(why, type="warning", multi_line=True, close_button="OK", timeout=0)
 
-    def _hear(self, message: tuple[Any, ...]) -> None:
-        if message[0] == "told":
-            self.words, self.done, self.total = message[1], 0, 0
-        else:
-            self.done, self.total = message[1:]
+    def _hear(self, words: str | None, done: int, total: int) -> None:
+        self.words = self.words if words is None else words
+        self.done, self.total = done, total
 
     def _take(self, changes: Changes) -> None:
         view, told = changes.pop("view", None), changes.pop("depends_on", None)

@@ -10,19 +10,16 @@ from nicegui import events, ui
 
 from wrist_stiffness.comparing.curve import condition_label
 from wrist_stiffness.errors import WristError
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.report.page import number
 from wrist_stiffness.web.figures import (
     AXES,
-    SYMBOL,
     Figure,
     Shown,
     contrast,
     error_map,
     minutes,
-    number,
-    rms,
+    spelled,
     time_line,
-    unit_of,
     waterfall,
 )
 from wrist_stiffness.web.tab import DEPENDS, VERSIONS, Tab
@@ -127,26 +124,22 @@ class Views:
         self._numbers.clear()
         with self._numbers:
             for quantity in tab.quantities:
-                key, unit = quantity.key, unit_of(quantity)
+                key, unit = quantity.key, spelled(quantity.unit)
                 sizes = [each.held_out[key] for each in versions[1:] or versions]
                 path = " → ".join(number(size) for size in dict.fromkeys((sizes[0], sizes[-1])))
                 with ui.column().classes("gap-0"):
-                    ui.label(f"Held-out error of {SYMBOL[quantity.name]}").classes("text-xs")
+                    ui.label(f"Held-out error of {spelled(quantity.name)}").classes("text-xs")
                     ui.label(f"{path} {unit}").classes("text-3xl font-bold whitespace-nowrap")
                     ui.label(f"noise floor {number(tab.noise[key])} {unit}").classes("text-xs")
             with ui.column().classes("gap-0"):
-                units = shown.view.left.n_units
+                units, chosen = shown.view.left.n_units, shown.chosen
                 every = f"all {units} poses"
-                chosen = shown.chosen
                 if chosen is not None:
                     every = f"selected {int(chosen.sum())} of {units} poses"
-                sizes = [rms(shown.view.left.values, shown.quantity, chosen)]
-                if shown.after is not None:
-                    sizes.append(rms(shown.after, shown.quantity, chosen))
-                path = " → ".join(map(number, sizes))
-                what = f"Remaining {SYMBOL[shown.quantity.name]}, {every}"
+                what = f"Remaining {spelled(shown.quantity.name)}, {every}"
                 ui.label(what).classes("text-xs whitespace-nowrap")
-                ui.label(f"{path} {shown.unit}").classes("text-xl whitespace-nowrap")
+                fall = shown.fall(shown.quantity, chosen)
+                ui.label(fall).classes("text-xl whitespace-nowrap")
                 ui.label(shown.name or "\u00a0").classes("text-xs")
 
     def _draw_lower(self) -> None:
@@ -168,10 +161,9 @@ class Views:
         told, at = shown.view.left.covariates, shown.moment
         theta = np.array([told["theta_1"][at], told["theta_2"][at]])
         load = np.array([told[name][at] for name in ("fx", "fy", "fz", "mx", "my", "mz")])
-        error: Array = shown.view.measured[at]
         asked = float(self._factor.value or 0.0) or None
         try:
-            drawn, factor = wrist_figure(tab.table, theta, load, error, asked)
+            drawn, factor = wrist_figure(tab.table, theta, load, shown.view.measured[at], asked)
         except WristError as reason:
             self._wrist_title.text = f"The wrist: {reason}"
             return

@@ -39,7 +39,6 @@ def wrist_figure(
     push = Push(load[:3], load[3:], np.zeros(3))
     shapes = bent_shapes(table, theta, push)
     share = 100.0 * load_alone(table, table.workspace.configuration(theta), load)[1]
-    top = max(float(share.max()), 1.0)
     platform = shapes[-1]
     moved = [np.linalg.norm(shape.shift, axis=-1).max() for shape in shapes]
     reach = float(np.linalg.norm(platform.points, axis=-1).max())
@@ -48,9 +47,25 @@ def wrist_figure(
     if exaggeration is None:
         exaggeration = round_down(SEEN_M / max(float(max(moved)), 1e-9))
     bent = [shape.points + exaggeration * shape.shift for shape in shapes]
-    bodies = list(zip(bent, share.tolist(), strict=False))
-    traces = [_bodies(bodies, top), _rigid(shapes)]
-    traces.append(_disc(bent[-1], BENT, "#9ca3af"))
+    told = [
+        f"{name.replace('_', ' ')}: {part:.0f} %" for name, part in zip(ELASTIC, share, strict=True)
+    ]
+    counts = [each[..., 0].size for each in bent[:-1]]
+    bodies = {
+        **_mesh(bent[:-1]),
+        "intensity": np.repeat(share, counts),
+        "colorscale": MAP,
+        "cmin": 0.0,
+        "cmax": max(float(share.max()), 1.0),
+        "colorbar": {
+            "title": {"text": "share of strain energy [%]", "side": "right"},
+            "thickness": 12,
+            "len": 0.8,
+        },
+        "text": np.repeat(told, counts),
+        "hovertemplate": "%{text}<extra></extra>",
+    }
+    traces = [bodies, _rigid(shapes), _disc(bent[-1], BENT, "#9ca3af")]
     if np.isfinite(measured).all():
         turn, shift = exp_twist(exaggeration * measured)
         traces.append(_disc(platform.points @ turn.T + shift, MEASURED, RED))
@@ -63,7 +78,7 @@ def wrist_figure(
             "domain": {"x": [0.0, 1.0], "y": [0.1, 1.0]},
             "aspectmode": "data",
             "camera": {"eye": dict(zip("xyz", EYE, strict=True))},
-            "annotations": _names(bodies),
+            "annotations": _names(bent[:-1], told),
         },
         "uirevision": "kept",
         "legend": {"orientation": "h", "x": 0, "y": 0, "font": {"size": 11}},
@@ -72,37 +87,14 @@ def wrist_figure(
     return {"data": traces, "layout": layout, "config": config}, exaggeration
 
 
-def _bodies(bodies: list[tuple[Array, float]], top: float) -> Figure:
-    """Return all bodies as one net of triangles: a picture without a graphics card stays quick."""
-    points = [MM * each.reshape(-1, 3) for each, _ in bodies]
+def _mesh(bodies: list[Array]) -> Figure:
+    """Return grids of points (p, q, 3) as one net: without a graphics card too it is drawn soon."""
+    points = [MM * each.reshape(-1, 3) for each in bodies]
     firsts = np.cumsum([0, *(len(each) for each in points[:-1])])
-    nets = [_triangles(*each.shape[:2]) for each, _ in bodies]
+    nets = [_triangles(*each.shape[:2]) for each in bodies]
     faces = np.concatenate([first + net for first, net in zip(firsts, nets, strict=True)])
-    colour = np.concatenate(
-        [np.full(len(own), share) for own, (_, share) in zip(points, bodies, strict=True)]
-    )
-    text = [
-        f"{name}: {share:.0f} %"
-        for name, (each, share) in zip(ELASTIC, bodies, strict=True)
-        for _ in range(each.shape[0] * each.shape[1])
-    ]
-    x, y, z = np.concatenate(points).T
-    i, j, k = faces.T
-    return {
-        "type": "mesh3d",
-        **{"x": x, "y": y, "z": z, "i": i, "j": j, "k": k},
-        "intensity": colour,
-        "colorscale": MAP,
-        "cmin": 0.0,
-        "cmax": top,
-        "colorbar": {
-            "title": {"text": "share of strain energy [%]", "side": "right"},
-            "thickness": 12,
-            "len": 0.8,
-        },
-        "text": text,
-        "hovertemplate": "%{text}<extra></extra>",
-    }
+    corners = dict(zip("xyzijk", (*np.concatenate(points).T, *faces.T), strict=True))
+    return {"type": "mesh3d", **corners}
 
 
 def _triangles(rows: int, columns: int) -> Array:
@@ -120,25 +112,19 @@ def _rigid(shapes: list[Shape]) -> Figure:
     for shape in shapes:
         for line in (*np.moveaxis(shape.points, 1, 0)[:4], *shape.points[-1:]):
             lines += [*(MM * line).tolist(), [None, None, None]]
-    x, y, z = zip(*lines, strict=True)
     return {
         "type": "scatter3d",
         "mode": "lines",
         "showlegend": False,
-        "x": x,
-        "y": y,
-        "z": z,
+        **dict(zip("xyz", zip(*lines, strict=True), strict=True)),
         "line": {"color": "#9ca3af", "width": 1},
         "hoverinfo": "skip",
     }
 
 
 def _disc(points: Array, name: str, colour: str) -> Figure:
-    x, y, z = MM * points.reshape(-1, 3).T
-    i, j, k = _triangles(*points.shape[:2]).T
     return {
-        "type": "mesh3d",
-        **{"x": x, "y": y, "z": z, "i": i, "j": j, "k": k},
+        **_mesh([points]),
         "color": colour,
         "opacity": 0.55,
         "name": name,
@@ -147,12 +133,12 @@ def _disc(points: Array, name: str, colour: str) -> Figure:
     }
 
 
-def _names(bodies: list[tuple[Array, float]]) -> list[Figure]:
+def _names(bodies: list[Array], told: list[str]) -> list[Figure]:
     """Return names and shares of the bodies, each led away from the middle as first seen."""
     right = np.cross([0.0, 0.0, 1.0], EYE)
     right /= np.linalg.norm(right)
     up = np.cross(EYE, right) / np.linalg.norm(EYE)
-    middles = np.array([points.mean(axis=(0, 1)) for points, _ in bodies])
+    middles = np.array([points.mean(axis=(0, 1)) for points in bodies])
     seen = (middles - middles.mean(axis=0)) @ np.stack([right, up], axis=1)
     seen /= np.linalg.norm(seen, axis=1, keepdims=True)
     # Neighbours take turns in the length of their leaders.
@@ -161,7 +147,7 @@ def _names(bodies: list[tuple[Array, float]]) -> list[Figure]:
     return [
         {
             **dict(zip("xyz", (MM * middle).tolist(), strict=True)),
-            "text": f"{name.replace('_', ' ')}: {share:.0f} %",
+            "text": text,
             "ax": float(way[0]),
             "ay": -float(way[1]),
             "xanchor": "left" if way[0] > 0.0 else "right",
@@ -170,5 +156,5 @@ def _names(bodies: list[tuple[Array, float]]) -> list[Figure]:
             "bgcolor": "rgba(255, 255, 255, 0.8)",
             "font": {"size": 11, "color": "#111827"},
         }
-        for name, (_, share), middle, way in zip(ELASTIC, bodies, middles, leaders, strict=True)
+        for text, middle, way in zip(told, middles, leaders, strict=True)
     ]
