@@ -13,7 +13,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import block_diagonal, unit
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.catalogue import ALL, STRANGERS
-from wrist_stiffness.simulation.effect_entry import Draw, Entry, effect
+from wrist_stiffness.simulation.effect_entry import Draw, Entry
 from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.joint_friction import joint_turn
 from wrist_stiffness.simulation.laws.law import DRIVEN, MOTOR, Bending, Law, Rubbing, at_component
@@ -175,7 +175,7 @@ class AirConditioner(Law):
 
 
 # 1 N at the platform, 0.3 m above the table's middle, moves it by 0.3 mm: it is felt to float.
-@effect(("frame",), "rad/(N m)", 1e-4, 3e-3, 0.1)
+@Entry(("frame",), "rad/(N m)", 1e-4, 3e-3, 0.1)
 def air_table(d: Draw) -> Law:
     """Return a table that tilts about two level axes some way below the wrist."""
     below = np.append(d.rng.uniform(-0.1, 0.1, 2), d.rng.uniform(-0.4, -0.2))
@@ -184,7 +184,7 @@ def air_table(d: Draw) -> Law:
 
 
 # A link that twists by half a degree under the largest moment through it is about to break.
-@effect(("link_1",), "rad/(N m)", 3e-3, 0.3, 5.0)
+@Entry(("link_1",), "rad/(N m)", 3e-3, 0.3, 5.0)
 def crack(d: Draw) -> Law:
     """Return a crack in the middle of the link that gapes for one of both senses."""
     near, far = d.table.geometry.link_ends(d.component)
@@ -194,7 +194,7 @@ def crack(d: Draw) -> Law:
 
 
 # A pin that is 0.1 mm to either side rattles.
-@effect(("joint_3",), "m", 3e-6, 1e-4, 1e-3)
+@Entry(("joint_3",), "m", 3e-6, 1e-4, 1e-3)
 def pin_climb(d: Draw) -> Law:
     """Return a pin that is sprung to a random side."""
     across = np.append(unit(np.cross(d.seat.axis, d.direction())), np.zeros(3))
@@ -203,14 +203,14 @@ def pin_climb(d: Draw) -> Law:
 
 
 # At the end of the joint's way several times the torque of the largest load: the motors stall.
-@effect(("joint_4",), "N m/rad", 5e-3, 0.3, 3.0)
+@Entry(("joint_4",), "N m/rad", 5e-3, 0.3, 3.0)
 def sealing_boot(d: Draw) -> Law:
     """Return a boot that was clipped on with the wrist at home."""
     return SealingBoot(d.component, d.seat.axis, d.magnitude)
 
 
 # 0.1 mm at one kelvin: it strikes its housing.
-@effect(("motor_2",), "m/K", 5e-6, 1e-4, 1e-3)
+@Entry(("motor_2",), "m/K", 5e-6, 1e-4, 1e-3)
 def bowed_shaft(d: Draw) -> Law:
     """Return a shaft that bows to a random side."""
     axis = d.table.geometry.axes[DRIVEN[d.component]]
@@ -218,7 +218,7 @@ def bowed_shaft(d: Draw) -> Law:
 
 
 # Half a kilogram of paste in a cup of 0.1 m: wider than the wrist.
-@effect(("platform",), "kg m", 5e-4, 5e-2, 0.2)
+@Entry(("platform",), "kg m", 5e-4, 5e-2, 0.2)
 def paste_cup(d: Draw) -> Law:
     """Return a cup that stands upright on the platform at home."""
     weight = d.magnitude * d.table.geometry.gravity
@@ -226,14 +226,14 @@ def paste_cup(d: Draw) -> Law:
 
 
 # At full speed several times the rated force.
-@effect(("load_sensor",), "N s/rad", 0.05, 10.0, 20.0)
+@Entry(("load_sensor",), "N s/rad", 0.05, 10.0, 20.0)
 def pickup(d: Draw) -> Law:
     """Return a cable along that of the first motor."""
     return Pickup("motor_1", d.magnitude * np.append(d.direction(), 0.02 * d.direction()))
 
 
 # Beams that are bent by 0.1 mm over a few metres are seen to shimmer.
-@effect(("pose_sensor",), "m", 3e-6, 1e-4, 1e-2)
+@Entry(("pose_sensor",), "m", 3e-6, 1e-4, 1e-2)
 def air_conditioner(d: Draw) -> Law:
     """Return a thermostat that switches every half minute or so."""
     return AirConditioner(d.twist(), d.rng.uniform(25.0, 70.0), d.rng.uniform())

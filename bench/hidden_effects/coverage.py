@@ -41,7 +41,7 @@ from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.base import base_laws
 from wrist_stiffness.simulation.catalogue import CATALOGUE, HiddenEffect, is_plausible
-from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness
+from wrist_stiffness.simulation.laws.law import UniformSoftness
 
 FIRST_SEED = 8001
 """Seeds of wrists and noise from here on are used by nothing else."""

@@ -13,7 +13,7 @@ from right_sentences import LOAD, LOAD_SENSOR, POSE, RATES, RIGHT, SEEN, Right
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross, dot, unit
 from wrist_stiffness.simulation.block import Block, Rate
 from wrist_stiffness.simulation.catalogue import ALL, STRANGERS
-from wrist_stiffness.simulation.effect_entry import Draw, Entry, effect
+from wrist_stiffness.simulation.effect_entry import Draw, Entry
 from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.joint_friction import joint_turn
 from wrist_stiffness.simulation.laws.law import (
@@ -22,11 +22,9 @@ from wrist_stiffness.simulation.laws.law import (
     Bending,
     Flowing,
     Law,
-    LoadReading,
     PlatformForce,
-    PlatformMotion,
+    SensorMotion,
 )
-from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion
 
 
 @dataclass(frozen=True)
@@ -128,7 +126,7 @@ def standing(rate: Rate, late: Late, stirring: float, block: Block, rotation: Ar
 
 
 # 0.05 mm at 1 N is a broken bushing.
-@effect(("joint_4",), "m/N", 1e-6, 5e-5, 1e-3)
+@Entry(("joint_4",), "m/N", 1e-6, 5e-5, 1e-3)
 def slit_bush(d: Draw) -> Law:
     """Return a bushing whose slit looks up or down, within 20 deg: it gives way to the side."""
     seat = d.seat
@@ -139,7 +137,7 @@ def slit_bush(d: Draw) -> Law:
 
 
 # At 20 mN m, the moment of the largest load, half a degree: both halves are seen to hinge.
-@effect(("link_2",), "rad/(N m)", 1e-2, 0.5, 10.0)
+@Entry(("link_2",), "rad/(N m)", 1e-2, 0.5, 10.0)
 def lap_joint(d: Draw) -> Law:
     """Return a bolt in the middle of the link, along its radius, that grips too little."""
     near, far = d.table.geometry.link_ends(d.component)
@@ -147,7 +145,7 @@ def lap_joint(d: Draw) -> Law:
 
 
 # At 1 N and the usual 0.3 rad/s this is 0.15 mm: the pin seizes.
-@effect(("joint_2",), "m s/(N rad)", 5e-5, 5e-4, 2e-2)
+@Entry(("joint_2",), "m s/(N rad)", 5e-5, 5e-4, 2e-2)
 def hot_pin(d: Draw) -> Law:
     """Return a thin sleeve, which warms up and cools down within some ten or twenty seconds."""
     seat, side = d.seat, d.magnitude * unit(np.cross(d.seat.axis, d.direction()))
@@ -157,7 +155,7 @@ def hot_pin(d: Draw) -> Law:
 
 
 # 0.3 deg are seen as a jerk at every stop.
-@effect(("motor_1",), "rad", 1e-4, 5e-3, 0.02)
+@Entry(("motor_1",), "rad", 1e-4, 5e-3, 0.02)
 def holding_brake(d: Draw) -> Law:
     """Return a brake behind the encoder, which does not see what it does."""
     kick = d.rng.choice((-1.0, 1.0)) * d.magnitude
@@ -165,7 +163,7 @@ def holding_brake(d: Draw) -> Law:
 
 
 # Five times the rated load: the wrist is caught.
-@effect(("platform",), "N", 0.1, 5.0, 100.0)
+@Entry(("platform",), "N", 0.1, 5.0, 100.0)
 def steel_post(d: Draw) -> Law:
     """Return a magnet in the gripper that passes a post of steel; the pull is that at 12 mm."""
     magnet, gap = d.platform_spot, 0.012
@@ -182,7 +180,7 @@ def steel_post(d: Draw) -> Law:
 
 
 # The motor is to be some ten kelvins warmer than the room: 1 mm is seen to shimmer.
-@effect(("pose_sensor",), "m/K", 3e-6, 1e-4, 5e-3)
+@Entry(("pose_sensor",), "m/K", 3e-6, 1e-4, 5e-3)
 def heat_plume(d: Draw) -> Law:
     """Return beams bent by air over a motor; the plume stands again a second or so after a move."""
     stirring, late = d.rng.uniform(0.1, 0.3), Late(d.rng.uniform(0.5, 2.0))
@@ -190,7 +188,7 @@ def heat_plume(d: Draw) -> Law:
 
 
 # Within a second as much as the rated load.
-@effect(("load_sensor",), "N/s", 5e-3, 1.0, 10.0)
+@Entry(("load_sensor",), "N/s", 5e-3, 1.0, 10.0)
 def charge_amplifier(d: Draw) -> Law:
     """Return a piezoelectric sensor; it drifts, in its own axes, until its amplifier is reset."""
     said = d.magnitude * np.append(d.direction(), 0.02 * d.direction())
@@ -200,11 +198,11 @@ def charge_amplifier(d: Draw) -> Law:
         since_s = period_s * np.mod(block.time_s / period_s + phase, 1.0)
         return wrench + since_s[:, None] * (block_diagonal(block.configuration.platform) @ said)
 
-    return LoadReading(drifted)
+    return Law(d.component, read_load=drifted)
 
 
 # 0.3 mm in each metre: cups on the table are heard to rattle.
-@effect(("frame",), "rad", 1e-5, 3e-4, 1e-2)
+@Entry(("frame",), "rad", 1e-5, 3e-4, 1e-2)
 def fork_lift(d: Draw) -> Law:
     """Return a floor that dips under a fork lift, which comes past every half minute or so.
 
@@ -224,7 +222,7 @@ def fork_lift(d: Draw) -> Law:
         dip = 1.0 / (1.0 + place**2) ** 2
         return np.column_stack([place * dip, dip]) @ tilts
 
-    return PlatformMotion(tilted)
+    return Law(d.component, twist=tilted)
 
 
 NEWER = {name: each for name, each in list(globals().items()) if isinstance(each, Entry)}

@@ -8,7 +8,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.base import base_laws
 from wrist_stiffness.simulation.cell import CellSettings
-from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness
+from wrist_stiffness.simulation.laws.law import UniformSoftness
 
 SECONDS, RATE_HZ = 60.0, 10.0
 SEEDS = range(1001, 1005)

@@ -12,8 +12,8 @@ from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS
 from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.rubbing import Bristles, dragged, slip
+from wrist_stiffness.simulation.laws.bushing import play
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
-from wrist_stiffness.simulation.laws.joint_play import JointClearance
 from wrist_stiffness.simulation.seat import Seat
 from wrist_stiffness.simulation.wrist import TrueWrist
 
@@ -161,7 +161,7 @@ def test_play_beside_friction_is_nearly_the_truth(
 
     def true(*names):
         laws = {
-            "play": JointClearance(
+            "play": play(
                 loose, Seat.of(geometry, loose), 1e-6 * clearance_um, SMALL_FORCE, "algebraic"
             ),
             "friction": JointFriction(

@@ -1,6 +1,7 @@
 """Each hidden law does what nature does: oracles are closed forms, energies and limits."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,13 +19,12 @@ from wrist_stiffness.simulation.catalogue import (
     places,
 )
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
+from wrist_stiffness.simulation.effect_entry import Draw
 from wrist_stiffness.simulation.heat import CAPACITY, HEATED, TO_ROOM, HeatNetwork
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
-from wrist_stiffness.simulation.laws.bushing_polymer import Creep
-from wrist_stiffness.simulation.laws.joint_play import JointClearance
-from wrist_stiffness.simulation.laws.motor_turn import Backlash
-from wrist_stiffness.simulation.laws.point_mass import Inertia
-from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
+from wrist_stiffness.simulation.laws.bushing import Creep, play
+from wrist_stiffness.simulation.laws.drive import Backlash
+from wrist_stiffness.simulation.laws.platform import Inertia
 from wrist_stiffness.simulation.laws.time_delay import DelayLine
 from wrist_stiffness.simulation.seat import Seat
 from wrist_stiffness.simulation.wrist import TrueWrist
@@ -137,7 +137,7 @@ def test_bending_law_has_an_energy_and_its_tangent_is_the_slope(place, wrist):
 def test_pin_lies_at_half_the_clearance_where_the_reaction_pushes(wrist):
     table = wrist()
     seat = Seat.of(table.geometry, "joint_3")
-    law = JointClearance("joint_3", seat, 20e-6, 1e-3, "algebraic")
+    law = play("joint_3", seat, 20e-6, 1e-3, "algebraic")
     block = block_of(table, 1)
     to_origin = seat.to_origin(block.rotation("joint_3"))[0]
     push = np.cross(seat.axis, [0.3, 0.5, -0.7])
@@ -151,7 +151,7 @@ def test_pin_lies_at_half_the_clearance_where_the_reaction_pushes(wrist):
 def test_moment_tilts_the_pin_until_both_ends_touch(wrist):
     table = wrist()
     seat = Seat.of(table.geometry, "joint_3")
-    law = JointClearance("joint_3", seat, 20e-6, 1e-3, "exponential")
+    law = play("joint_3", seat, 20e-6, 1e-3, "exponential")
     block = block_of(table, 1)
     to_origin = seat.to_origin(block.rotation("joint_3"))[0]
     about = np.cross(seat.axis, [0.0, 0.6, 0.8])
@@ -314,9 +314,9 @@ def test_a_wrist_that_grows_as_a_whole_only_carries_its_plate_outward(wrist):
         radius = geometry.links[link].arc_radius
         bushings[joint] = replace(bushings[joint], radius=radius)
     geometry = replace(geometry, bushings=bushings)
-    strain = 1e-5
+    strain, replaced = 1e-5, SimpleNamespace(geometry=geometry)
     laws = [
-        ThermalExpansion(body, strain, growing_spots(geometry, body), 0.0)
+        ALL["thermal_expansion"].make(Draw(replaced, body, "linear", strain, None))
         for body in ("frame", "link_1", "link_2", "platform")
     ]
     theta = np.array([[0.3, -0.4], [-0.5, 0.2]])

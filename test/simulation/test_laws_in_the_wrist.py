@@ -6,8 +6,8 @@ import pytest
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
 from wrist_stiffness.simulation.heat import HEATED
-from wrist_stiffness.simulation.laws.bushing_polymer import Creep
-from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness
+from wrist_stiffness.simulation.laws.bushing import Creep
+from wrist_stiffness.simulation.laws.law import UniformSoftness
 from wrist_stiffness.simulation.wrist import TrueWrist
 
 ANGLES = np.array([0.2, -0.3])

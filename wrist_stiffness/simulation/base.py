@@ -8,10 +8,14 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.simulation.laws.joint_play import FlangeGap
-from wrist_stiffness.simulation.laws.law import BodyScrew, Law, LoadReading
-from wrist_stiffness.simulation.laws.part_stiffness import UniformSoftness
-from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion, TargetMounting
+from wrist_stiffness.simulation.laws.law import (
+    BodyScrew,
+    Law,
+    SensorMotion,
+    UniformSoftness,
+    flange_gap,
+    target_motion,
+)
 from wrist_stiffness.simulation.seat import Seat
 
 BASES = ("exact", "wrong")
@@ -44,8 +48,8 @@ def base_laws(name: str, table: Table, seed: int, session: int) -> list[Law]:
         *softer,
         *axes,
         *_shims(table, axes),
-        LoadReading(lambda block, wrench: scale * wrench),
-        TargetMounting(turn * day.uniform(-1.0, 1.0, 6)),
+        Law("load_sensor", read_load=lambda block, wrench: scale * wrench),
+        target_motion(turn * day.uniform(-1.0, 1.0, 6)),
         SensorMotion(turn * day.uniform(-1.0, 1.0, 6)),
     ]
 
@@ -62,7 +66,7 @@ def _shims(table: Table, axes: list[BodyScrew]) -> list[Law]:
     rows = influence(table.mechanism.forward(np.zeros(2))).slides()
     slides = sum(rows[ELASTIC.index(law.component)] @ law.screw[:3] for law in axes)
     return [
-        FlangeGap(joint, float(-table.components.contact[joint].sign[0] * slide))
+        flange_gap(joint, float(-table.components.contact[joint].sign[0] * slide))
         for joint, slide in zip(PASSIVE_JOINTS, np.asarray(slides), strict=True)
         if joint in table.components.contact
     ]

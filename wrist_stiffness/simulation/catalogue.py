@@ -8,10 +8,9 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.simulation import makers
+from wrist_stiffness.simulation import makers, strangers
 from wrist_stiffness.simulation.effect_entry import Draw, Entry
 from wrist_stiffness.simulation.laws.law import Law
-from wrist_stiffness.simulation.strangers import makers as strange
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class HiddenEffect:
 CATALOGUE = {name: each for name, each in vars(makers).items() if isinstance(each, Entry)}
 """Effects that a diagnosis knows by name, in the order in which seeds draw them."""
 
-STRANGERS = {name: each for name, each in vars(strange).items() if isinstance(each, Entry)}
+STRANGERS = {name: each for name, each in vars(strangers).items() if isinstance(each, Entry)}
 """Effects that nobody has thought of."""
 
 ALL = CATALOGUE | STRANGERS

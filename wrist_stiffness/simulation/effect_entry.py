@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,29 +48,16 @@ class Draw:
 
 @dataclass(frozen=True)
 class Entry:
-    """One effect."""
+    """One effect; it decorates the function that draws its law, which gives it its name."""
 
-    # `components`, `forms`: places, and functional forms of the law
-    components: tuple[str, ...]
-    forms: tuple[str, ...]
+    components: tuple[str, ...]  # places
     unit: str  # of the magnitude
     plausible: float  # magnitude that an ordinary wrist may have
     largest: float  # magnitude beyond which no wrist still works
     limit: float  # largest magnitude that can be simulated
-    make: Callable[[Draw], Law]  # law of a draw
+    forms: tuple[str, ...] = ("plain",)  # functional forms of the law
+    make: Callable[[Draw], Law] = lambda draw: Law()  # law of a draw
 
-
-def effect(
-    components: tuple[str, ...],
-    unit: str,
-    plausible: float,
-    largest: float,
-    limit: float,
-    forms: tuple[str, ...] = ("plain",),
-) -> Callable[[Callable[[Draw], Law]], Entry]:
-    """Return what makes an entry of the function that draws its law, which gives it its name."""
-
-    def entry(make: Callable[[Draw], Law]) -> Entry:
-        return Entry(components, forms, unit, plausible, largest, limit, make)
-
-    return entry
+    def __call__(self, make: Callable[[Draw], Law]) -> Entry:
+        """Return the effect with its law."""
+        return replace(self, make=make)

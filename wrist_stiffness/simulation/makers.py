@@ -6,6 +6,7 @@ The comment says why a wrist with more than the largest magnitude would not work
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +19,7 @@ from wrist_stiffness.mechanism.components import (
     MOTORS,
     PASSIVE_JOINTS,
     Array,
+    ElasticComponents,
 )
 from wrist_stiffness.mechanism.vectors import (
     block_diagonal,
@@ -28,33 +30,24 @@ from wrist_stiffness.mechanism.vectors import (
     unit,
 )
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.effect_entry import LEVER, Draw, effect
+from wrist_stiffness.simulation.effect_entry import LEVER, Draw, Entry
 from wrist_stiffness.simulation.equilibrium import Equilibrium
-from wrist_stiffness.simulation.laws.bushing_polymer import (
-    BushingHardening,
-    Creep,
-    ThermalSoftening,
-)
-from wrist_stiffness.simulation.laws.cable_wrench import CableWrench
-from wrist_stiffness.simulation.laws.drive import Drive, one_sided, stiffening
+from wrist_stiffness.simulation.laws.bushing import Creep, hardening, play, softening
+from wrist_stiffness.simulation.laws.drive import Backlash, ahead_of_encoder, winding
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
-from wrist_stiffness.simulation.laws.joint_play import FlangeGap, JointClearance
 from wrist_stiffness.simulation.laws.law import (
     DRIVEN,
-    JOINED,
     BodyScrew,
     Law,
-    LoadReading,
-    PlatformMotion,
+    PlatformForce,
+    SensorMotion,
+    UniformSoftness,
+    flange_gap,
+    in_series,
+    no_screws,
+    target_motion,
 )
-from wrist_stiffness.simulation.laws.motor_turn import (
-    AheadOfEncoder,
-    Backlash,
-)
-from wrist_stiffness.simulation.laws.part_stiffness import InSeries, UniformSoftness
-from wrist_stiffness.simulation.laws.point_mass import AddedMass, Inertia, MountingTilt
-from wrist_stiffness.simulation.laws.pose_sensor import SensorMotion, TargetMounting
-from wrist_stiffness.simulation.laws.thermal_expansion import ThermalExpansion, growing_spots
+from wrist_stiffness.simulation.laws.platform import Inertia, Strands
 from wrist_stiffness.simulation.laws.time_delay import TimeDelay
 from wrist_stiffness.simulation.seat import Seat
 
@@ -69,7 +62,7 @@ def spring(d: Draw, place: Array) -> Array:
 
 
 # Aluminium where steel was drawn bends three times as much.
-@effect(LINKS, "-", 0.2, 2.0, 50.0, ("uniform", "hinge"))
+@Entry(LINKS, "-", 0.2, 2.0, 50.0, ("uniform", "hinge"))
 def link_stiffness(d: Draw) -> Law:
     """Return softer steel, or a cracked bore: it bends about all axes there.
 
@@ -80,45 +73,63 @@ def link_stiffness(d: Draw) -> Law:
     end = d.table.geometry.link_ends(d.component)[d.rng.integers(2)]
     place = d.table.geometry.links[d.component].arc_radius * end
     turn = np.vstack([skew(place), np.eye(3)])
-    return InSeries(
+    return in_series(
         d.component, lambda own: d.magnitude * np.trace(own[3:, 3:]) / 3.0 * turn @ turn.T
     )
 
 
 # The softest grade of the polymer has a quarter of the modulus.
-@effect(JOINTS, "-", 0.2, 3.0, 50.0)
+@Entry(JOINTS, "-", 0.2, 3.0, 50.0)
 def bushing_stiffness(d: Draw) -> Law:
     """Return softer polymer."""
     return UniformSoftness(d.component, d.magnitude)
 
 
+STIFFER = 0.01
+"""Torque at which a stiffening drive has half of its softness left [N m]."""
+
+
 # A belt that gives 3 deg at 1 N m is off its wheel.
-@effect(MOTORS, "rad/(N m)", 2e-3, 0.05, 5.0, ("linear", "stiffening", "one_sided"))
+@Entry(MOTORS, "rad/(N m)", 2e-3, 0.05, 5.0, ("linear", "stiffening", "one_sided"))
 def drive_compliance(d: Draw) -> Law:
-    """Return a linear drive, a stiffening one, or one of which a flank is worn."""
-    axis = d.table.geometry.axes[DRIVEN[d.component]]
+    """Return a linear drive, a stiffening one, or one of which a flank is worn.
+
+    A saturating logarithm stiffens: teeth touch more fully under torque.
+    """
+    joint = DRIVEN[d.component]
+    axis = d.table.geometry.axes[joint]
     if d.form == "stiffening":
-        return Drive(DRIVEN[d.component], axis, partial(stiffening, d.magnitude))
+
+        def stiffening(block: Block, torque: Array) -> tuple[Array, Array]:
+            turn = d.magnitude * STIFFER * np.arcsinh(torque / STIFFER)
+            return turn, d.magnitude / np.sqrt(1.0 + (torque / STIFFER) ** 2)
+
+        return winding(joint, axis, stiffening)
     if d.form == "one_sided":
         lean = d.rng.choice((-1.0, 1.0)) * d.rng.uniform(0.2, 0.5)
-        softness = d.magnitude * (1.0 + lean), d.magnitude * (1.0 - lean)
-        return Drive(DRIVEN[d.component], axis, partial(one_sided, softness))
+        above, below = d.magnitude * (1.0 + lean), d.magnitude * (1.0 - lean)
+
+        def one_sided(block: Block, torque: Array) -> tuple[Array, Array]:
+            own = np.where(torque > 0.0, above, below)
+            return own * torque, own
+
+        return winding(joint, axis, one_sided)
     about = np.concatenate([np.zeros(3), axis])
-    return InSeries(DRIVEN[d.component], lambda own: d.magnitude * np.outer(about, about))
+    return in_series(joint, lambda own: d.magnitude * np.outer(about, about))
 
 
 # A bracket that gives 10 um at 1 N is seen to move by hand.
-@effect(MOTORS, "m/N", 5e-7, 1e-5, 2e-4)
+@Entry(MOTORS, "m/N", 5e-7, 1e-5, 2e-4)
 def mount_compliance(d: Draw) -> Law:
     """Return a bracket 20 mm behind the bushing, which sits in the frame as the bracket does."""
     seat = Seat.of(d.table.geometry, DRIVEN[d.component])
     place = seat.centre + 0.02 * seat.axis
     bracket = d.magnitude * spring(d, place)
-    return InSeries(DRIVEN[d.component], lambda own: bracket)
+    return in_series(DRIVEN[d.component], lambda own: bracket)
 
 
 # As a bracket.
-@effect(("frame",), "m/N", 5e-7, 1e-5, 2e-4)
+@Entry(("frame",), "m/N", 5e-7, 1e-5, 2e-4)
 def frame_compliance(d: Draw) -> Law:
     """Return a spring under the limbs."""
     place = d.rng.uniform(-0.05, 0.05, 3)
@@ -129,11 +140,11 @@ def frame_compliance(d: Draw) -> Law:
         whole = sum(state.through[:, ELASTIC.index(joint)] for joint in DRIVEN.values())
         return np.asarray(whole) @ flexibility
 
-    return PlatformMotion(moved)
+    return Law(d.component, twist=moved)
 
 
 # As a bracket.
-@effect(("platform",), "m/N", 5e-7, 1e-5, 2e-4)
+@Entry(("platform",), "m/N", 5e-7, 1e-5, 2e-4)
 def platform_compliance(d: Draw) -> Law:
     """Return a spring behind the limbs."""
     flexibility = d.magnitude * spring(d, d.platform_spot)
@@ -143,51 +154,65 @@ def platform_compliance(d: Draw) -> Law:
         local = np.einsum("nji,nj->ni", turn, block.load)
         return np.einsum("nij,nj->ni", turn, local @ flexibility)
 
-    return PlatformMotion(moved)
+    return Law(d.component, twist=moved)
 
 
 # 200 g are several times the platform, and a tilt of 4 m/s2 is 24 deg.
-@effect(("platform", *LINKS), "kg", 3e-3, 0.2, 5.0, ("mass", "tilt"))
+@Entry(("platform", *LINKS), "kg", 3e-3, 0.2, 5.0, ("mass", "tilt"))
 def gravity(d: Draw) -> Law:
     """Return a mass, or a tilt with the weight of the magnitude at 50 g."""
+    if d.form == "tilt":
+        across = np.cross(d.direction(), unit(d.table.geometry.gravity))
+        # Gravity turns the other way.
+        lean = Rotation.from_rotvec(-d.magnitude / 0.05 * unit(across))
+        return Law(d.component, gravity=lean.apply)
     if d.component == "platform":
-        if d.form == "tilt":
-            across = np.cross(d.direction(), unit(d.table.geometry.gravity))
-            return MountingTilt(d.magnitude / 0.05 * unit(across))
-        return AddedMass("platform", d.magnitude, d.platform_spot)
-    ends = d.table.geometry.link_ends(d.component)
-    place = unit(ends[0] + ends[1]) * d.table.geometry.links[d.component].arc_radius
-    return AddedMass(d.component, d.magnitude, place + d.rng.uniform(-0.01, 0.01, 3))
+        place = d.platform_spot
+    else:
+        ends = d.table.geometry.link_ends(d.component)
+        place = unit(ends[0] + ends[1]) * d.table.geometry.links[d.component].arc_radius
+        place = place + d.rng.uniform(-0.01, 0.01, 3)
+    weight = d.magnitude * np.vstack([np.eye(3), skew(place)])
+
+    def heavier(parts: ElasticComponents) -> ElasticComponents:
+        if d.component == "platform":
+            return replace(parts, platform_weight=parts.platform_weight + weight)
+        # The bore on the platform's side holds it.
+        carried = parts.weight_platform_side.copy()
+        carried[ELASTIC.index(d.component)] += weight
+        return replace(parts, weight_platform_side=carried)
+
+    return Law(d.component, parts=heavier)
 
 
 # A pin with 0.1 mm of play rattles.
-@effect(JOINTS, "m", 5e-6, 1e-4, 5e-4, ("algebraic", "exponential"))
+@Entry(JOINTS, "m", 5e-6, 1e-4, 5e-4, ("algebraic", "exponential"))
 def joint_clearance(d: Draw) -> Law:
     """Return play with a random roughness."""
-    return JointClearance(d.component, d.seat, d.magnitude, d.rng.uniform(0.005, 0.03), d.form)
+    return play(d.component, d.seat, d.magnitude, d.rng.uniform(0.005, 0.03), d.form)
 
 
 # Shims are graded in tenths of a millimetre.
-@effect(PASSIVE_JOINTS, "m", 1e-6, 1e-4, 5e-4, ("open", "pressed"))
+@Entry(PASSIVE_JOINTS, "m", 1e-6, 1e-4, 5e-4, ("open", "pressed"))
 def flange_contact(d: Draw) -> Law:
     """Return a flange that was opened or pressed on."""
     sign = 1.0 if d.form == "open" else -1.0
-    return FlangeGap(d.component, sign * d.magnitude)
+    return flange_gap(d.component, sign * d.magnitude)
 
 
 # Half of the flexibility is gone under load.
-@effect(JOINTS, "-", 0.2, 0.5, 0.5, ("saturating", "power"))
+@Entry(JOINTS, "-", 0.2, 0.5, 0.5, ("saturating", "power"))
 def bushing_hardening(d: Draw) -> Law:
     """Return hardening that sets in below 1 N."""
     flexibility = d.table.components.flexibility[ELASTIC.index(d.component)]
     to_centre = d.seat.to_origin(np.eye(3)).T
     local = to_centre @ flexibility @ to_centre.T
     energy = 0.5 * np.trace(local[:3, :3]) / 3.0 * d.rng.uniform(0.3, 1.0)
-    return BushingHardening(d.component, d.magnitude, energy, d.form)
+    return hardening(d.component, d.magnitude, energy, d.form)
 
 
 # Dry polymer on rough steel.
-@effect(PASSIVE_JOINTS, "-", 0.1, 0.5, 0.5, ("coulomb", "stribeck"))
+@Entry(PASSIVE_JOINTS, "-", 0.1, 0.5, 0.5, ("coulomb", "stribeck"))
 def joint_friction(d: Draw) -> Law:
     """Return friction with a few micrometres of pre-sliding."""
     stribeck = 0.5 if d.form == "stribeck" else 0.0
@@ -196,7 +221,7 @@ def joint_friction(d: Draw) -> Law:
 
 
 # 0.3 deg of lost motion is felt by hand.
-@effect(MOTORS, "rad", 1e-4, 5e-3, 0.02, ("single", "train"))
+@Entry(MOTORS, "rad", 1e-4, 5e-3, 0.02, ("single", "train"))
 def backlash(d: Draw) -> Law:
     """Return one pair of teeth or a train of them."""
     widths = [1.0] if d.form == "single" else [0.4, 0.8, 1.2, 1.6]
@@ -204,14 +229,14 @@ def backlash(d: Draw) -> Law:
 
 
 # 1 deg is seen at the home mark.
-@effect(MOTORS, "rad", 2e-4, 0.02, 0.05)
+@Entry(MOTORS, "rad", 2e-4, 0.02, 0.05)
 def encoder_offset(d: Draw) -> Law:
     """Return a wrong zero."""
-    return AheadOfEncoder(d.component, lambda angle: np.full_like(angle, d.magnitude))
+    return ahead_of_encoder(d.component, lambda angle: np.full_like(angle, d.magnitude))
 
 
 # A disc of 20 mm that is 0.1 mm off its centre.
-@effect(MOTORS, "-", 2e-4, 5e-3, 0.05, ("once", "twice"))
+@Entry(MOTORS, "-", 2e-4, 5e-3, 0.05, ("once", "twice"))
 def encoder_eccentricity(d: Draw) -> Law:
     """Return a disc off its centre, or pressed oval, read by one head.
 
@@ -224,11 +249,11 @@ def encoder_eccentricity(d: Draw) -> Law:
         at = lobes * angle + phase
         return np.asarray(np.arctan2(d.magnitude * np.sin(at), 1.0 + d.magnitude * np.cos(at)))
 
-    return AheadOfEncoder(d.component, ahead)
+    return ahead_of_encoder(d.component, ahead)
 
 
 # Teeth of the worst grade.
-@effect(MOTORS, "rad", 1e-4, 2e-3, 0.02, ("single", "train"))
+@Entry(MOTORS, "rad", 1e-4, 2e-3, 0.02, ("single", "train"))
 def transmission_error(d: Draw) -> Law:
     """Return one order, or harmonics of which each is half as high as the one before.
 
@@ -243,11 +268,11 @@ def transmission_error(d: Draw) -> Law:
         waves = (height * np.sin(orders * angle[:, None] + phases)).sum(axis=-1)
         return np.asarray(waves * (1.0 + 0.3 * (count > 1) * np.cos(angle)))
 
-    return AheadOfEncoder(d.component, ahead)
+    return ahead_of_encoder(d.component, ahead)
 
 
 # A bore that is 0.2 mm and 0.4 deg off is not assembled.
-@effect(JOINTS, "m", 2e-5, 2e-4, 2e-3)
+@Entry(JOINTS, "m", 2e-5, 2e-4, 2e-3)
 def axis_misalignment(d: Draw) -> Law:
     """Return shift and tilt across the axis; along it the joint is free."""
     axis = d.table.geometry.axes[d.component]
@@ -258,25 +283,48 @@ def axis_misalignment(d: Draw) -> Law:
 
 
 # The polymer with the largest growth.
-@effect(
+@Entry(
     ("link_1", "link_2", "frame", "platform"), "1/K", 1.2e-5, 1e-4, 2e-2, ("linear", "quadratic")
 )
 def thermal_expansion(d: Draw) -> Law:
-    """Return linear or quadratic growth."""
-    quadratic = 0.0 if d.form == "linear" else 0.05
-    spots = growing_spots(d.table.geometry, d.component)
-    return ThermalExpansion(d.component, d.magnitude, spots, quadratic)
+    """Return linear growth, or quadratic as of polymers and composites.
+
+    The frame carries the bearings of both motors away from O; a link's bores move apart; on the
+    platform the two bearings move away from the plate's centre, which is what the tool keeps.
+    """
+    geometry, body, quadratic = d.table.geometry, d.component, 0.05 * (d.form == "quadratic")
+    at = {joint: b.radius * geometry.axes[joint] for joint, b in geometry.bushings.items()}
+    # How far the platform side of a component moves per unit strain, at home in F [m].
+    if body == "frame":
+        spots = {joint: at[joint] for joint in ("joint_1", "joint_5")}
+    elif body == "platform":
+        centre = np.asarray(geometry.platform.centre)
+        spots = {joint: centre - at[joint] for joint in ("joint_2", "joint_3")}
+    else:
+        near, far = geometry.link_ends(body)
+        spots = {body: geometry.links[body].arc_radius * (far - near)}
+
+    def grown(block: Block) -> Array:
+        kelvin = block.temperature_of(body)
+        strain = d.magnitude * kelvin * (1.0 + quadratic * kelvin)
+        out = no_screws(block)
+        turn = block.configuration.rotations[body]
+        for component, lever in spots.items():
+            out[:, ELASTIC.index(component), :3] += strain[:, None] * (turn @ lever)
+        return out
+
+    return Law(body, screws=grown)
 
 
 # A polymer at its glass transition loses 5 % in each kelvin.
-@effect(JOINTS, "1/K", 0.01, 0.05, 1.0, ("exponential", "glassy"))
+@Entry(JOINTS, "1/K", 0.01, 0.05, 1.0, ("exponential", "glassy"))
 def thermal_softening(d: Draw) -> Law:
     """Return softening at the mean temperature of the joined bodies."""
-    return ThermalSoftening(d.component, JOINED[d.component], d.magnitude, d.form)
+    return softening(d.component, d.magnitude, d.form)
 
 
 # As much creep as elastic strain.
-@effect(JOINTS, "-", 0.2, 1.0, 2.0, ("standard_solid", "power_law"))
+@Entry(JOINTS, "-", 0.2, 1.0, 2.0, ("standard_solid", "power_law"))
 def creep(d: Draw) -> Law:
     """Return one time constant or a row of three."""
     time_s = d.rng.uniform(5.0, 40.0)
@@ -288,37 +336,49 @@ def creep(d: Draw) -> Law:
 
 
 # A hose, not a cable.
-@effect(("platform",), "N/m", 2.0, 50.0, 500.0, ("smooth", "rubbing"))
+@Entry(("platform",), "N/m", 2.0, 50.0, 500.0, ("smooth", "rubbing"))
 def cable_wrench(d: Draw) -> Law:
-    """Return a cable from a random side."""
+    """Return a cable from a random side: a spring of its length, and its strands' friction."""
     azimuth = d.rng.uniform(0.0, 2.0 * np.pi)
     frame = np.array([0.09 * np.cos(azimuth), 0.09 * np.sin(azimuth), d.rng.uniform(-0.08, -0.03)])
+    spot, slack = d.platform_spot, d.rng.uniform(0.02, 0.06)
+    # Friction over the pull of 1 cm.
     rub = 0.5 if d.form == "rubbing" else 0.1
-    return CableWrench(frame, d.platform_spot, d.magnitude, d.rng.uniform(0.02, 0.06), rub)
+
+    def pulled(strands: Strands, block: Block, at: Array) -> Array:
+        line = frame - at
+        length = np.sqrt(np.sum(line * line, axis=-1))
+        pull = d.magnitude * np.maximum(length - slack, 0.0) + strands(length)
+        return (pull / length)[:, None] * line
+
+    return PlatformForce(spot, partial(pulled, Strands(rub * d.magnitude * 0.01)))
 
 
 # Half of the rated force is seen at rest.
-@effect(("load_sensor",), "N", 0.02, 0.5, 5.0, ("constant", "warm_up"))
+@Entry(("load_sensor",), "N", 0.02, 0.5, 5.0, ("constant", "warm_up"))
 def load_bias(d: Draw) -> Law:
     """Return a bias in a random direction, there from the start or as the sensor warms up."""
     bias = d.magnitude * np.concatenate([d.direction(), 0.01 * d.direction()])
     if d.form == "constant":
-        return LoadReading(lambda block, wrench: wrench + bias)
+        return Law(d.component, read_load=lambda block, wrench: wrench + bias)
     warm_up_s = d.rng.uniform(60.0, 200.0)
-    return LoadReading(
-        lambda block, wrench: wrench + np.outer(-np.expm1(-block.time_s / warm_up_s), bias)
+    return Law(
+        d.component,
+        read_load=lambda block, wrench: (
+            wrench + np.outer(-np.expm1(-block.time_s / warm_up_s), bias)
+        ),
     )
 
 
 # Another sensor's calibration sheet.
-@effect(("load_sensor",), "-", 0.03, 0.3, 20.0, ("scale",))
+@Entry(("load_sensor",), "-", 0.03, 0.3, 20.0, ("scale",))
 def load_scale(d: Draw) -> Law:
     """Return one gain for all axes."""
-    return LoadReading(lambda block, wrench: (1.0 + d.magnitude) * wrench)
+    return Law(d.component, read_load=lambda block, wrench: (1.0 + d.magnitude) * wrench)
 
 
 # A tenth of full scale on the wrong axis: the cable is torn.
-@effect(("load_sensor",), "-", 0.01, 0.1, 5.0)
+@Entry(("load_sensor",), "-", 0.01, 0.1, 5.0)
 def load_cross_talk(d: Draw) -> Law:
     """Return a calibration matrix that is off by the magnitude at random, relative to full scale.
 
@@ -326,19 +386,19 @@ def load_cross_talk(d: Draw) -> Law:
     """
     scale = np.repeat([1.0, 0.01], 3)
     talk = d.rng.normal(size=(6, 6)) * d.magnitude * scale[:, None] / scale
-    return LoadReading(lambda block, wrench: wrench + wrench @ talk.T)
+    return Law(d.component, read_load=lambda block, wrench: wrench + wrench @ talk.T)
 
 
 # 11 deg are seen by eye.
-@effect(("load_sensor",), "rad", 0.03, 0.2, 3.0)
+@Entry(("load_sensor",), "rad", 0.03, 0.2, 3.0)
 def load_misalignment(d: Draw) -> Law:
     """Return a sensor turned about a random axis."""
     mounted = Rotation.from_rotvec(d.magnitude * d.direction()).as_matrix()
-    return LoadReading(lambda block, wrench: both_halves(mounted.T, wrench))
+    return Law(d.component, read_load=lambda block, wrench: both_halves(mounted.T, wrench))
 
 
 # As far off as the sensor is long.
-@effect(("load_sensor",), "m", 2e-3, 0.03, 0.5, ("frame", "platform"))
+@Entry(("load_sensor",), "m", 2e-3, 0.03, 0.5, ("frame", "platform"))
 def load_point(d: Draw) -> Law:
     """Return a lever-arm error in F or in U."""
     point = d.magnitude * d.direction()
@@ -349,25 +409,25 @@ def load_point(d: Draw) -> Law:
         moment = wrench[:, 3:] - cross(np.broadcast_to(at, force.shape), force)
         return np.concatenate([force, moment], axis=1)
 
-    return LoadReading(about)
+    return Law(d.component, read_load=about)
 
 
 # Seen by eye.
-@effect(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
+@Entry(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
 def measurement_frame(d: Draw) -> Law:
     """Return a registration error of the sensor."""
     return SensorMotion(d.twist())
 
 
 # Seen by eye.
-@effect(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
+@Entry(("pose_sensor",), "m", 5e-5, 1e-2, 1e-2)
 def target_mounting(d: Draw) -> Law:
     """Return a registration error of the target."""
-    return TargetMounting(d.twist())
+    return target_motion(d.twist())
 
 
 # 0.1 mm in five minutes: the tripod is not fixed.
-@effect(("pose_sensor",), "m", 5e-6, 1e-4, 1e-2, ("linear", "settling", "daily"))
+@Entry(("pose_sensor",), "m", 5e-6, 1e-4, 1e-2, ("linear", "settling", "daily"))
 def drift(d: Draw) -> Law:
     """Return a drift that has its magnitude after 5 minutes, or a wave of four times that."""
     shape: Callable[[Array], Array] = {
@@ -379,14 +439,14 @@ def drift(d: Draw) -> Law:
 
 
 # A tenth of a second is a dropped message.
-@effect(("pose_sensor", "load_sensor", *MOTORS), "s", 5e-3, 0.1, 0.5)
+@Entry(("pose_sensor", "load_sensor", *MOTORS), "s", 5e-3, 0.1, 0.5)
 def time_delay(d: Draw) -> Law:
     """Return a late stamp."""
     return TimeDelay(d.component, d.magnitude, d.table.mechanism)
 
 
 # More than twenty times the platform.
-@effect(("platform",), "kg", 0.05, 0.5, 50.0)
+@Entry(("platform",), "kg", 0.05, 0.5, 50.0)
 def inertia(d: Draw) -> Law:
     """Return a tool in motion."""
     return Inertia(d.magnitude, d.platform_spot, d.rng.uniform(0.01, 0.025))

@@ -1,44 +1,62 @@
-"""`drive_compliance`: gears and couplings that wind up."""
+"""Motors with their gears and couplings: what winds up, turns less or stands ahead."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.simulation.block import Block
-from wrist_stiffness.simulation.laws.law import Bending
+from wrist_stiffness.simulation.laws.law import MOTOR, Bending, Law
 
 
-@dataclass(frozen=True)
-class Drive(Bending):
-    """Gears and coupling of a motor, which wind up about its axis by a law of their own."""
+def winding(
+    joint: str, axis: Array, wound: Callable[[Block, Array], tuple[Array, Array]]
+) -> Bending:
+    """Let gears and coupling of a driven joint wind up about its axis (3,) by a law of their own.
 
-    component: str  # driven joint
-    axis: Array  # (3,), motor axis in F
-    # torque (n,) [N m] to turn (n,) [rad] and its slope (n,)
-    wound: Callable[[Block, Array], tuple[Array, Array]]
+    `wound`: torque (n,) [N m] to turn (n,) [rad] and its slope (n,).
+    """
+    about = np.concatenate([np.zeros(3), axis])
 
-    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
-        """Turn about the motor axis."""
-        about = np.concatenate([np.zeros(3), self.axis])
-        turn, slope = self.wound(block, wrench @ about)
+    def bend(block: Block, wrench: Array) -> tuple[Array, Array]:
+        turn, slope = wound(block, wrench @ about)
         return turn[:, None] * about, slope[:, None, None] * np.outer(about, about)
 
-
-STIFFER = 0.01
-"""Torque at which a stiffening drive has half of its softness left [N m]."""
+    return Bending(joint, bend=bend)
 
 
-def stiffening(softness: float, block: Block, torque: Array) -> tuple[Array, Array]:
-    """Turn by a saturating logarithm: teeth touch more fully under torque."""
-    turn = softness * STIFFER * np.arcsinh(torque / STIFFER)
-    return turn, softness / np.sqrt(1.0 + (torque / STIFFER) ** 2)
+def ahead_of_encoder(motor: str, ahead: Callable[[Array], Array]) -> Law:
+    """Let a link stand ahead of its motor's encoder, (n,) [rad] at encoder angles (n,) [rad]."""
+
+    def turn(time_s: Array, shaft: Array) -> Array:
+        out, column = np.zeros_like(shaft), MOTOR[motor]
+        out[:, column] = ahead(shaft[:, column])
+        return out
+
+    return Law(motor, turn=turn)
 
 
-def one_sided(softness: tuple[float, float], block: Block, torque: Array) -> tuple[Array, Array]:
-    """Turn by the softness of the flank that is loaded: of torques above 0, or below."""
-    own = np.where(torque > 0.0, *softness)
-    return own * torque, own
+class Backlash(Law):
+    """Lost motion: the link is dragged by the flanks of its gear or coupling.
+
+    `widths` (k,): full widths of k play operators in parallel [rad]; one is a single pair of teeth,
+    several (Prandtl-Ishlinskii) a train whose teeth take hold one after the other.
+    """
+
+    def __init__(self, motor: str, widths: Array) -> None:
+        self._column = MOTOR[motor]
+        self._half = np.asarray(widths) / 2.0
+        self._link: Array | None = None
+
+    def turn(self, time_s: Array, shaft: Array) -> Array:
+        """Drag the link within the play."""
+        x = shaft[:, self._column]
+        link = np.full(len(self._half), x[0]) if self._link is None else self._link
+        out = np.zeros_like(shaft)
+        for i, angle in enumerate(x):
+            link = np.clip(link, angle - self._half, angle + self._half)
+            out[i, self._column] = link.mean() - angle
+        self._link = link
+        return out

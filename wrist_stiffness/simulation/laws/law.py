@@ -1,15 +1,19 @@
-"""What every hidden law offers; a hook that is not overridden leaves the base as it is."""
+"""What every hidden law offers, and those laws of which there are many.
+
+A hook that is not given leaves the base as it is.
+"""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross
 from wrist_stiffness.simulation.block import Block
 
@@ -19,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Law:
-    """One departure of the true wrist from its base.
+    """One departure of the true wrist from its base: a subclass, or made of its hooks.
 
     Hooks are called once for each block, in the order of time and in the order in which they stand
     here.  A law with a history advances it in the hook that ends with "and remember"; a copy of the
@@ -27,6 +31,12 @@ class Law:
     hangs on the forces inside the wrist is found together with them: `Bending`, `Flowing`,
     `Rubbing`.
     """
+
+    component: str
+
+    def __init__(self, component: str = "", **hooks: Callable[..., Any]) -> None:
+        self.component = component
+        vars(self).update(hooks)
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Return other elastic parts, once before the start."""
@@ -72,51 +82,83 @@ class Law:
         return rotation, shift
 
 
-class Bending(Law, ABC):
+class Bending(Law):
     """A component with a law of its own between wrench and screw."""
 
-    component: str
-
-    @abstractmethod
-    def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
-        """Return the screw (n, 6) and its tangent (n, 6, 6) under the wrench (n, 6) through it."""
+    bend: Callable[[Block, Array], tuple[Array, Array]]
+    """Return the screw (n, 6) and its tangent (n, 6, 6) under the wrench (n, 6) through it."""
 
 
-class Flowing(Law, ABC):
+class Flowing(Law):
     """A component whose screw follows the history of its wrench."""
 
-    component: str
-
-    @abstractmethod
-    def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
-        """Return the screw (n, 6) after the history of the wrench (n, 6) through it."""
+    flow: Callable[[Block, Array, bool], Array]
+    """Return the screw (n, 6) after the history of the wrench (n, 6) through it; true: remember."""
 
 
-class Rubbing(Law, ABC):
+class Rubbing(Law):
     """A passive joint with friction."""
 
-    component: str
+    rub: Callable[[Block, Array, Equilibrium, Array, bool], Array]
+    """Return force and torque of friction along the joint's axis, (n, 2) [N, N m].
 
-    @abstractmethod
-    def rub(
-        self, block: Block, give: Array, state: Equilibrium, acting: Array, remember: bool
-    ) -> Array:
-        """Return force and torque of friction along the joint's axis, (n, 2) [N, N m].
-
-        `state` was found with the friction `acting` (n, 2) in this joint; `give` (n, 3, 2, 2) is
-        what a little more of it moves there.
-        """
+    Of (block, give, state, acting, remember): `state` was found with the friction `acting` (n, 2)
+    in this joint; `give` (n, 3, 2, 2) is what a little more of it moves there.
+    """
 
 
-@dataclass(frozen=True)
-class LoadReading(Law):
-    """A load sensor that reads another wrench."""
+class UniformSoftness(Law):
+    """Another modulus: all of a part's flexibility, its flanges included, grows alike.
 
-    said: Callable[[Block, Array], Array]  # what it says instead of a wrench, (n, 6)
+    `fraction`: extra flexibility of a link or joint over that of the base, > -1 [-].
+    """
 
-    def read_load(self, block: Block, wrench: Array) -> Array:
-        """Read it."""
-        return self.said(block, wrench)
+    def __init__(self, component: str, fraction: float) -> None:
+        super().__init__(component)
+        self.fraction = fraction
+
+    def parts(self, parts: ElasticComponents) -> ElasticComponents:
+        """Scale flexibility and flanges."""
+        scale = 1.0 + self.fraction
+        flexibility = parts.flexibility.copy()
+        flexibility[ELASTIC.index(self.component)] *= scale
+        contact = dict(parts.contact)
+        if self.component in contact:
+            flange = contact[self.component]
+            contact[self.component] = replace(
+                flange,
+                screw=scale * flange.screw,
+                approach=scale * flange.approach,
+                weight_approach=scale * flange.weight_approach,
+            )
+        return replace(parts, flexibility=flexibility, contact=contact)
+
+
+def in_series(component: str, added: Callable[[Array], Array]) -> Law:
+    """Add to the flexibility of a component what it says of that, both (6, 6) at O in F."""
+
+    def softer(parts: ElasticComponents) -> ElasticComponents:
+        flexibility, k = parts.flexibility.copy(), ELASTIC.index(component)
+        flexibility[k] += added(flexibility[k])
+        return replace(parts, flexibility=flexibility)
+
+    return Law(component, parts=softer)
+
+
+def flange_gap(joint: str, change: float) -> Law:
+    """Change the axial gap at the flanges of a passive joint [m]; negative presses them on.
+
+    Its hook raises `InputError` if the joint has no flange in this table.
+    """
+
+    def moved(parts: ElasticComponents) -> ElasticComponents:
+        if joint not in parts.contact:
+            raise InputError(f"flange_contact: {joint} has no flange in this table")
+        flange = parts.contact[joint]
+        flange = replace(flange, gap=flange.gap + change)
+        return replace(parts, contact={**parts.contact, joint: flange})
+
+    return Law(joint, parts=moved)
 
 
 @dataclass(frozen=True)
@@ -129,21 +171,10 @@ class BodyScrew(Law):
 
     def screws(self, block: Block) -> Array:
         """Turn it with its body."""
-        turned = block_diagonal(block.rotation(self.component)) @ self.screw
+        at = block_diagonal(block.rotation(self.component)) @ self.screw
         if self.share is not None:
-            turned = self.share(block)[:, None] * turned
-        return at_component(block, self.component, np.asarray(turned))
-
-
-@dataclass(frozen=True)
-class PlatformMotion(Law):
-    """A motion of the whole platform besides what the limbs let it do."""
-
-    moved: Callable[[Block, Equilibrium], Array]  # its twist, (n, 6) at O in F [m, rad]
-
-    def twist(self, block: Block, state: Equilibrium) -> Array:
-        """Move the platform."""
-        return self.moved(block, state)
+            at = self.share(block)[:, None] * at
+        return at_component(block, self.component, at)
 
 
 @dataclass(frozen=True)
@@ -158,6 +189,32 @@ class PlatformForce(Law):
         at = block.configuration.platform @ self.place
         force = self.force(block, at)
         return np.concatenate([force, cross(at, force)], axis=-1)
+
+
+@dataclass(frozen=True)
+class SensorMotion(Law):
+    """The sensor's frame is not F: T_seen = exp(share X) T."""
+
+    motion: Array  # (6,), X [m, rad]
+    # of samples and of what was to be seen (n, 3, 3), how much of X is there (n,); None for all
+    share: Callable[[Block, Array], Array] | None = None
+
+    def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
+        """Move everything by it."""
+        motion = self.motion
+        if self.share is not None:
+            motion = self.share(block, rotation)[:, None] * motion
+        turn, move = exp_twist(motion)
+        return turn @ rotation, (turn @ shift[..., None])[..., 0] + move
+
+
+def target_motion(motion: Array) -> Law:
+    """See a target in another place on the platform: T_seen = T exp(Y), `motion` (6,) Y in U."""
+    turn, move = exp_twist(motion)
+    return Law(
+        "pose_sensor",
+        read_pose=lambda block, rotation, shift: (rotation @ turn, shift + rotation @ move),
+    )
 
 
 def no_screws(block: Block) -> Array:

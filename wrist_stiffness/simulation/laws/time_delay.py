@@ -8,6 +8,8 @@ sampled at 10 Hz is wrong by an eighth of what a delay of 5 ms does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
@@ -47,6 +49,11 @@ class DelayLine:
         self._time_s, self._values = times[first:], known[first:]
         return out
 
+    def past(self, time_s: Array, values: Array, nominal: Callable[[Array], Array]) -> Array:
+        """Return the same of values (n, d) of which a part (n, d) is known at all times."""
+        then = nominal(self.moments(time_s))
+        return then + self(time_s, values - nominal(time_s))
+
 
 class TimeDelay(Law):
     """A late stamp on pose, load or one motor angle.
@@ -58,7 +65,7 @@ class TimeDelay(Law):
     _program: Program
 
     def __init__(self, component: str, delay_s: float, mechanism: Mechanism) -> None:
-        self._component = component
+        super().__init__(component)
         self._line, self._speed_line = DelayLine(delay_s), DelayLine(delay_s)
         self._mechanism = mechanism
 
@@ -68,33 +75,32 @@ class TimeDelay(Law):
 
     def read_shaft(self, time_s: Array, shaft: Array) -> Array:
         """Read one motor late."""
-        if self._component not in MOTOR:
-            return shaft
-        out, column = shaft.copy(), MOTOR[self._component]
-        now, then = (self._program.sent(t) for t in (time_s, self._line.moments(time_s)))
-        out[:, column] = (then + self._line(time_s, shaft - now))[:, column]
-        return out
+        return self._late_motor(self._line, time_s, shaft, self._program.sent)
 
     def read_speed(self, time_s: Array, speed: Array) -> Array:
         """See the speed of the same motor late."""
-        if self._component not in MOTOR:
-            return speed
-        out, column = speed.copy(), MOTOR[self._component]
-        now, then = (self._program.speed(t) for t in (time_s, self._speed_line.moments(time_s)))
-        out[:, column] = (then + self._speed_line(time_s, speed - now))[:, column]
+        return self._late_motor(self._speed_line, time_s, speed, self._program.speed)
+
+    def _late_motor(
+        self, line: DelayLine, time_s: Array, values: Array, nominal: Callable[[Array], Array]
+    ) -> Array:
+        if self.component not in MOTOR:
+            return values
+        out, column = values.copy(), MOTOR[self.component]
+        out[:, column] = line.past(time_s, values, nominal)[:, column]
         return out
 
     def read_load(self, block: Block, wrench: Array) -> Array:
         """Read the load late."""
-        if self._component != "load_sensor":
+        if self.component != "load_sensor":
             return wrench
-        moments = self._line.moments(block.time_s)
-        now, then = (self._program.load(self._program.phase(t)) for t in (block.time_s, moments))
-        return then + self._line(block.time_s, wrench - now)
+        return self._line.past(
+            block.time_s, wrench, lambda at: self._program.load(self._program.phase(at))
+        )
 
     def read_pose(self, block: Block, rotation: Array, shift: Array) -> tuple[Array, Array]:
         """Read the pose late; its turn from where the program has the platform is about O."""
-        if self._component != "pose_sensor":
+        if self.component != "pose_sensor":
             return rotation, shift
         moments = self._line.moments(block.time_s)
         now, then = (

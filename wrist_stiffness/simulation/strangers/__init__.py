@@ -1,1 +1,0 @@
-"""Laws outside the catalogue of effects: a diagnosis should say that it does not know them."""
