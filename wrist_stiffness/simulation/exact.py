@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
@@ -19,25 +20,17 @@ from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array,
 from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.statics import component_rotations, turned_flexibilities
-from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.mechanism.vectors import block_diagonal, both_halves, cross
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
 from wrist_stiffness.simulation.laws.law import Bending, Law
 
-GROUND = -1
+# fmt: off
 FRAMES = (
-    "pin_1",
-    "pin_2",
-    "wall_2",
-    "pin_5",
-    "pin_4",
-    "wall_4",
-    "hub_4",
-    "pin_3",
-    "wall_3",
-    "platform",
+    "pin_1", "pin_2", "wall_2", "pin_5", "pin_4", "wall_4", "hub_4", "pin_3", "wall_3", "platform",
 )
+# fmt: on
 ENDS = {
     "link_1": ("pin_1", "pin_2"),
     "link_2": ("pin_5", "pin_4"),
@@ -57,6 +50,25 @@ PAIRS = {
 }
 """Frames that a cylindrical pair joins."""
 
+_NUMBER = {frame: i for i, frame in enumerate((*FRAMES, "ground"))}
+_NEAR, _FAR = np.array([[_NUMBER[f] for f in two] for two in (*ENDS.values(), *PAIRS.values())]).T
+"""Number of the near and of the far frame of each component, then of each pair, (11,)."""
+
+_HEAVY = np.concatenate([_NEAR[: len(ELASTIC)], _FAR[: len(ELASTIC)], [_NUMBER["platform"]]])
+"""Frames that carry weights: both sides of each component, and the platform, (17,)."""
+
+_INCIDENCE = np.eye(len(_NUMBER))[_FAR] - np.eye(len(_NUMBER))[_NEAR]
+_APART = np.kron(_INCIDENCE[:, : len(FRAMES)], np.eye(6))
+"""From small screws of all frames to those of the far frames against the near ones, (66, 60)."""
+
+_PAIRS_APART = _APART[6 * len(ELASTIC) :].reshape(len(PAIRS), 6, -1)
+
+_SCREW = slice(0, 6 * len(FRAMES))
+_THROUGH = slice(_SCREW.stop, _SCREW.stop + 6 * len(ELASTIC))
+_REACTION = slice(_THROUGH.stop, _THROUGH.stop + 4 * len(PAIRS))
+_SIZE = _REACTION.stop
+"""Of the unknowns: displacements, wrenches through components, reactions of pairs."""
+
 MICRO = 1e-6
 """Lengths and angles are counted in millionths, so that they are of the size of the forces."""
 
@@ -73,15 +85,8 @@ class ExactState:
 
     rotation: Array  # (3, 3), U -> F of the platform
     shift: Array  # (3,), position of the platform's point O in F [m]
-    # (8, 6), wrench through each component, in the axes of its displaced motor side [N, N m]
-    through: Array
     slip: Array  # (3, 2), slide [m] and small turn [rad] of each pair from the rigid pose
     force: Array  # (m,), flange forces [N]
-
-
-def number(frame: str) -> int:
-    """Return the number of a frame, `GROUND` for the ground."""
-    return GROUND if frame == "ground" else FRAMES.index(frame)
 
 
 class ExactWrist:
@@ -147,36 +152,27 @@ class _System:
         laws: Sequence[Law],
         drags: dict[str, _Drag],
     ) -> None:
-        self._block, self._drags = block, drags
+        self._block, self._drags, self._gravity = block, drags, gravity
         configuration = block.configuration
         self._flexibility = block.flexibility[0]
         turns = component_rotations(configuration)[0]
-        wide = block_diagonal(turns)
-        axes = (configuration.b[0], configuration.c[0], configuration.d[0])
-        self._axes = dict(zip(PAIRS, axes, strict=True))
-        self._across = {}
-        for joint, axis in self._axes.items():
-            self._across[joint] = np.kron(np.eye(2), np.linalg.svd(axis[None])[2][1:])
+        axes = [axis[0] for axis in (configuration.b, configuration.c, configuration.d)]
+        # Rows of each pair: slide and turn (3, 2, 6), and what it locks (3, 4, 6).
+        self._along = np.stack([np.kron(np.eye(2), axis) for axis in axes])
+        self._across = np.stack(
+            [np.kron(np.eye(2), np.linalg.svd(axis[None])[2][1:]) for axis in axes]
+        )
         sectors = parts.sectors
-        self._own, self._slide = sectors.component, sectors.slide
-        self._sector_screw = (wide[self._own] @ sectors.screw[..., None])[..., 0]
-        self._approach = sectors.approach
+        self._own, self._slide, self._approach = sectors.component, sectors.slide, sectors.approach
+        self._sector_screw = both_halves(turns[self._own], sectors.screw)
         self._gap = sectors.gap + np.einsum(
             "mi,mji,j->m", sectors.weight_approach, turns[self._own], gravity
         )
-        self._gravity = gravity
-        self._weights = [
-            (number(frame), _turned(weights[k], turns[k]))
-            for k, name in enumerate(ELASTIC)
-            for frame, weights in zip(
-                ENDS[name],
-                (parts.weight_motor_side, parts.weight_platform_side),
-                strict=True,
-            )
-            if frame != "ground"
-        ]
-        platform = configuration.platform[0]
-        self._weights.append((number("platform"), _turned(parts.platform_weight, platform)))
+        weights = np.concatenate(
+            [parts.weight_motor_side, parts.weight_platform_side, parts.platform_weight[None]]
+        )
+        turned = np.concatenate([turns, turns, configuration.platform])
+        self._weights = block_diagonal(turned) @ weights @ np.swapaxes(turned, -1, -2)
         self._load = block.load[0] + sum((law.wrench(block)[0] for law in laws), np.zeros(6))
         self._screws = sum((law.screws(block)[0] for law in laws), np.zeros((len(ELASTIC), 6)))
         self._bends = [
@@ -184,6 +180,7 @@ class _System:
             for law in laws
             if isinstance(law, Bending)
         ]
+        self._linear = self._linear_tangent()
 
     def solve(self) -> ExactState:
         """Newton's method; each step is a contact problem of the linear wrist at hand.
@@ -192,7 +189,13 @@ class _System:
         """
         z = np.zeros(_SIZE)
         force, closed = np.zeros(len(self._gap)), None
-        push, pull = self._contact_coupling()
+        # How z opens the gaps (m, size), and how forces enter the residual (size, m).
+        pull = np.zeros((len(self._gap), _SIZE))
+        pull[:, _SCREW] = np.einsum("mj,jx,jxz->mz", self._slide, self._along[:, 0], _PAIRS_APART)
+        rows = _THROUGH.start + 6 * self._own[:, None] + np.arange(6)
+        np.put_along_axis(pull, rows, self._sector_screw / MICRO, axis=1)
+        push = pull.T.copy()
+        push[_THROUGH] *= -1.0
         for step in range(MAX_STEPS):
             rest, tangent, gap = self._residual(z, force)
             if len(force):
@@ -217,14 +220,9 @@ class _System:
 
     def _residual(self, z: Array, force: Array) -> tuple[Array, Array, Array]:
         """Return residual, tangent over z, and the gaps; lengths in micrometres."""
-        screw, through, reaction = _split(z)
-        motion = exp_twist(MICRO * screw)
-        balance = np.zeros((len(FRAMES) + 1, 6))
-        bent = np.zeros((len(ELASTIC), 6))
-        tangent = self._linear_tangent()
-        balance[number("platform")] += self._load
-        for frame, weight in self._weights:
-            balance[frame] += _carried(motion, frame, weight @ (motion[0][frame].T @ self._gravity))
+        through, reaction = z[_THROUGH].reshape(-1, 6), z[_REACTION].reshape(-1, 4)
+        motion, apart, slips = self._moved(z)
+        tangent = self._linear.copy()
         given = self._screws + np.einsum("kij,kj->ki", self._flexibility, through)
         np.add.at(given, self._own, self._sector_screw * force[:, None])
         for k, law in self._bends:
@@ -232,134 +230,80 @@ class _System:
             given[k] += extra[0]
             rows = _THROUGH.start + 6 * k + np.arange(6)
             tangent[np.ix_(rows, rows)] -= slope[0] / MICRO
-        for k, name in enumerate(ELASTIC):
-            near, far = map(number, ENDS[name])
-            wrench = _carried(motion, near, through[k])
-            # The component resists: what stretches it pulls its platform side back.
-            balance[far] -= wrench
-            balance[near] += wrench
-            bent[k] = (_relative(motion, near, far) - given[k]) / MICRO
-        gap = self._gap + self._approach @ force
-        gap = gap + np.einsum("mi,mi->m", self._sector_screw, through[self._own])
-        closure = np.zeros((len(PAIRS), 4))
-        for j, (joint, (wall, hub)) in enumerate(PAIRS.items()):
-            relative = _relative(motion, number(wall), number(hub))
-            closure[j] = self._across[joint] @ relative / MICRO
-            along = self._axes[joint]
-            slip = np.array([along @ relative[:3], along @ relative[3:]])
-            gap = gap + self._slide[:, j] * slip[0]
-            pushed = np.concatenate([(self._slide[:, j] @ force) * along, np.zeros(3)])
-            pushed = pushed + self._across[joint].T @ reaction[j]
+        bent = apart[: len(ELASTIC)] - given
+        closure = np.einsum("jax,jx->ja", self._across, apart[len(ELASTIC) :])
+        gap = self._gap + self._approach @ force + self._slide @ slips[:, 0]
+        gap += np.einsum("mi,mi->m", self._sector_screw, through[self._own])
+        # Components and pairs resist: what moves the far side away is pulled back.
+        locked = np.einsum("jax,ja->jx", self._across, reaction)
+        locked -= (self._slide.T @ force)[:, None] * self._along[:, 0]
+        for j, joint in enumerate(PAIRS):
             if joint in self._drags:
-                pushed = pushed + self._drag(joint, slip, through, tangent)
-            wrench = _carried(motion, number(wall), pushed)
-            balance[number(hub)] += wrench
-            balance[number(wall)] -= wrench
-        rest = np.concatenate([balance[:-1].ravel(), bent.ravel(), closure.ravel()])
-        return rest, tangent, gap / MICRO
+                locked[j] -= self._drag(j, slips[j], through, tangent)
+        wrench = _carried(motion, _NEAR, np.concatenate([through, locked]))
+        balance = np.zeros((len(FRAMES) + 1, 6))
+        balance[_NUMBER["platform"]] += self._load
+        np.add.at(balance, _FAR, -wrench)
+        np.add.at(balance, _NEAR, wrench)
+        felt = np.swapaxes(motion[0][_HEAVY], -1, -2) @ self._gravity
+        weight = (self._weights @ felt[..., None])[..., 0]
+        np.add.at(balance, _HEAVY, _carried(motion, _HEAVY, weight))
+        lengths = np.concatenate([bent.ravel(), closure.ravel()])
+        return np.concatenate([balance[:-1].ravel(), lengths / MICRO]), tangent, gap / MICRO
 
-    def _drag(self, joint: str, slip: Array, through: Array, tangent: Array) -> Array:
-        """Return the wrench of friction on the hub and enter its slope into the tangent."""
+    def _moved(self, z: Array) -> tuple[Motion, Array, Array]:
+        """Return the motion, the twists (11, 6) of far frames in near ones, and slips (3, 2)."""
+        screw = np.concatenate([z[_SCREW].reshape(-1, 6), np.zeros((1, 6))])
+        turn, shift = exp_twist(MICRO * screw)
+        back = np.swapaxes(turn[_NEAR], -1, -2)
+        between = (back @ (shift[_FAR] - shift[_NEAR])[..., None])[..., 0]
+        apart = log_motion(back @ turn[_FAR], between)
+        return (turn, shift), apart, np.einsum("jhx,jx->jh", self._along, apart[len(ELASTIC) :])
+
+    def _friction(self, joint: str, slip: Array, through: Array) -> tuple[Array, Array, Array]:
+        """Return slide and radius times whole turn (2,) [m], friction on them, minus its slope."""
         drag = self._drags[joint]
-        arm = np.array([1.0, drag.law.seat.radius])
-        friction, slope = drag.force(self._path(joint, slip), self._reaction(joint, through))
-        along = np.zeros((2, 6))
-        along[0, :3] = along[1, 3:] = self._axes[joint]
-        pull = (along.T * arm) @ slope @ (arm[:, None] * along) * MICRO
-        wall, hub = (6 * number(frame) + np.arange(6) for frame in PAIRS[joint])
-        for rows, sign in ((hub, -1.0), (wall, 1.0)):
-            tangent[np.ix_(rows, hub)] += sign * pull
-            tangent[np.ix_(rows, wall)] -= sign * pull
-        return (arm * friction) @ along
+        turn = drag.law.turn_of(self._block)[0] + slip[1]
+        path = np.array([slip[0], drag.law.seat.radius * turn])
+        reaction = drag.law.reaction(self._block, through[None, ELASTIC.index(joint)])[0]
+        return path, *drag.force(path, reaction)
 
-    def _path(self, joint: str, slip: Array) -> Array:
-        """Return slide and radius times whole turn of a joint, (2,) [m]."""
-        law = self._drags[joint].law
-        return np.array([slip[0], law.seat.radius * (law.turn_of(self._block)[0] + slip[1])])
-
-    def _reaction(self, joint: str, through: Array) -> Array:
-        law = self._drags[joint].law
-        return law.reaction(self._block, through[None, ELASTIC.index(joint)])[0]
+    def _drag(self, j: int, slip: Array, through: Array, tangent: Array) -> Array:
+        """Return the wrench of friction on the hub and enter its slope into the tangent."""
+        joint = PASSIVE_JOINTS[j]
+        _, friction, slope = self._friction(joint, slip, through)
+        along = np.array([[1.0], [self._drags[joint].law.seat.radius]]) * self._along[j]
+        to_path = along @ _PAIRS_APART[j]
+        tangent[_SCREW, _SCREW] -= MICRO * to_path.T @ slope @ to_path
+        return friction @ along
 
     def _linear_tangent(self) -> Array:
         """Return the tangent without finite rotations, bending laws and friction."""
         out = np.zeros((_SIZE, _SIZE))
-        for k, name in enumerate(ELASTIC):
-            rows = _THROUGH.start + 6 * k + np.arange(6)
-            out[np.ix_(rows, rows)] = -self._flexibility[k] / MICRO
-            for frame, sign in zip(map(number, ENDS[name]), (-1.0, 1.0), strict=True):
-                if frame != GROUND:
-                    moved = 6 * frame + np.arange(6)
-                    out[rows, moved] = sign
-                    out[moved, rows] = -sign
-        for j, (joint, frames) in enumerate(PAIRS.items()):
-            rows = _REACTION.start + 4 * j + np.arange(4)
-            for frame, sign in zip(map(number, frames), (-1.0, 1.0), strict=True):
-                moved = 6 * frame + np.arange(6)
-                out[np.ix_(rows, moved)] = sign * self._across[joint]
-                out[np.ix_(moved, rows)] = sign * self._across[joint].T
+        pairs = np.concatenate(self._across @ _PAIRS_APART)
+        out[_SCREW.stop :, _SCREW] = np.concatenate([_APART[: _THROUGH.stop - _SCREW.stop], pairs])
+        out[_SCREW, _SCREW.stop :] = -out[_SCREW.stop :, _SCREW].T
+        out[_THROUGH, _THROUGH] = -block_diag(*self._flexibility) / MICRO
         return out
 
-    def _contact_coupling(self) -> tuple[Array, Array]:
-        """Return how forces enter the residual (size, m), and how z opens the gaps (m, size)."""
-        m = len(self._gap)
-        push, pull = np.zeros((_SIZE, m)), np.zeros((m, _SIZE))
-        for i, k in enumerate(self._own):
-            rows = _THROUGH.start + 6 * k + np.arange(6)
-            push[rows, i] = -self._sector_screw[i] / MICRO
-            pull[i, rows] = self._sector_screw[i] / MICRO
-        for j, (joint, frames) in enumerate(PAIRS.items()):
-            for frame, sign in zip(map(number, frames), (-1.0, 1.0), strict=True):
-                moved = 6 * frame + np.arange(3)
-                push[moved] += sign * np.outer(self._axes[joint], self._slide[:, j])
-                pull[:, moved] += sign * np.outer(self._slide[:, j], self._axes[joint])
-        return push, pull
-
     def _state(self, z: Array, force: Array) -> ExactState:
-        screw, through, _ = _split(z)
-        motion = exp_twist(MICRO * screw)
-        slip = np.zeros((len(PASSIVE_JOINTS), 2))
-        for j, (joint, frames) in enumerate(PAIRS.items()):
-            relative = _relative(motion, *map(number, frames))
-            slip[j] = self._axes[joint] @ relative[:3], self._axes[joint] @ relative[3:]
+        (turn, shift), _, slips = self._moved(z)
+        through = z[_THROUGH].reshape(-1, 6)
+        for j, joint in enumerate(PAIRS):
             if joint in self._drags:
-                path = self._path(joint, slip[j])
-                drag = self._drags[joint]
-                drag.keep(path, drag.force(path, self._reaction(joint, through))[0])
-        platform = number("platform")
-        rotation = motion[0][platform] @ self._block.configuration.platform[0]
-        return ExactState(rotation, motion[1][platform], through, slip, force)
-
-
-_SCREW = slice(0, 6 * len(FRAMES))
-_THROUGH = slice(_SCREW.stop, _SCREW.stop + 6 * len(ELASTIC))
-_REACTION = slice(_THROUGH.stop, _THROUGH.stop + 4 * len(PAIRS))
-_SIZE = _REACTION.stop
-
-
-def _split(z: Array) -> tuple[Array, Array, Array]:
-    """Return screws (11, 6) with the ground's last, wrenches (8, 6) and reactions (3, 4)."""
-    screw = np.concatenate([z[_SCREW].reshape(-1, 6), np.zeros((1, 6))])
-    return screw, z[_THROUGH].reshape(-1, 6), z[_REACTION].reshape(-1, 4)
+                path, friction, _ = self._friction(joint, slips[j], through)
+                self._drags[joint].keep(path, friction)
+        platform = _NUMBER["platform"]
+        rotation = turn[platform] @ self._block.configuration.platform[0]
+        return ExactState(rotation, shift[platform], slips, force)
 
 
 Motion = tuple[Array, Array]
-"""Displacement of every frame: rotations (11, 3, 3) and shifts (11, 3)."""
+"""Displacement of every frame, the ground's last: rotations (11, 3, 3) and shifts (11, 3)."""
 
 
-def _carried(motion: Motion, frame: int, wrench: Array) -> Array:
-    """Return at O in F a wrench (6,) that is fixed in a displaced frame."""
-    rotation, shift = motion[0][frame], motion[1][frame]
-    force = rotation @ wrench[:3]
-    return np.concatenate([force, rotation @ wrench[3:] + np.cross(shift, force)])
-
-
-def _relative(motion: Motion, near: int, far: int) -> Array:
-    """Return the twist (6,) of one frame's displacement against another's, in the latter's axes."""
-    back = motion[0][near].T
-    return log_motion(back @ motion[0][far], back @ (motion[1][far] - motion[1][near]))
-
-
-def _turned(weights: Array, turn: Array) -> Array:
-    """Return weights (6, 3) of a body that was turned (3, 3), for fields in F."""
-    return block_diagonal(turn) @ weights @ turn.T
+def _carried(motion: Motion, frames: Array, wrench: Array) -> Array:
+    """Return at O in F wrenches (n, 6) that are fixed in displaced frames (n,)."""
+    turned = both_halves(motion[0][frames], wrench)
+    turned[:, 3:] += cross(motion[1][frames], turned[:, :3])
+    return turned
