@@ -40,9 +40,10 @@ def random_load(rng: np.random.Generator) -> Array:
     return np.concatenate([force, np.cross(LEVER * rng.uniform(-1.0, 1.0, 3), force)])
 
 
-def move_seconds(start: Array, end: Array) -> float:
-    """Duration of a move between motor angles (2,) [rad] at the usual speed [s]."""
-    return 0.3 + float(np.max(np.abs(end - start))) / SPEED
+def move(schedule: Schedule, theta: Array, load: Array | None = None) -> None:
+    """Move the motors to `theta` (2,) [rad] at the usual speed, with the load or to another one."""
+    farthest = float(np.max(np.abs(theta - schedule.theta)))
+    schedule.go_on(0.3 + farthest / SPEED, theta, load)
 
 
 def rich(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
@@ -56,7 +57,7 @@ def rich(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Prog
     """
     reference = random_pose(workspace, rng)
     schedule = Schedule(reference)
-    schedule.rest(DWELL_S)
+    schedule.go_on(DWELL_S)
     theta, load = reference, np.zeros(6)
     count = 0
     while schedule.time_s < seconds:
@@ -67,7 +68,7 @@ def rich(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Prog
             theta = reference if to_reference else random_pose(workspace, rng)
             load = np.zeros(6) if to_reference else random_load(rng)
         _approach(schedule, workspace, theta, load, rng)
-        schedule.rest(15.0 if count % 11 == 0 else DWELL_S)
+        schedule.go_on(15.0 if count % 11 == 0 else DWELL_S)
         schedule.ambient(float(rng.uniform(-3.0, 3.0)))
     return schedule.program(LOADING_S)
 
@@ -77,15 +78,15 @@ def _approach(
 ) -> None:
     """Go to a pose from a random side, with the load carried along or put on after arrival."""
     carried = rng.uniform() < 0.5
-    schedule.put_on(load if carried else np.zeros(6), LOADING_S)
+    schedule.go_on(LOADING_S, load=load if carried else np.zeros(6))
     before = theta + np.radians(4.0) * rng.choice([-1.0, 1.0], 2) * rng.uniform(0.5, 1.0, 2)
     if not workspace.domain(before):
         before = theta
     for target in (before, theta):
         if not np.array_equal(target, schedule.theta):
-            schedule.move(target, move_seconds(schedule.theta, target))
+            move(schedule, target)
     if not carried:
-        schedule.put_on(load, LOADING_S)
+        schedule.go_on(LOADING_S, load=load)
 
 
 def paper(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Program:
@@ -101,13 +102,13 @@ def paper(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Pro
     poses = [middle + 0.7 * inside * half * np.array([x, y]) for x in axis for y in axis]
     load = np.array([0.0, 0.0, -FORCE, 0.0, 0.0, 0.0])
     schedule = Schedule(poses[0])
-    schedule.put_on(load, LOADING_S)
+    schedule.go_on(LOADING_S, load=load)
     while schedule.time_s < seconds:
         for pose in poses:
             before = pose - np.radians(3.0)
             for target in (before, pose):
-                schedule.move(target, move_seconds(schedule.theta, target))
-            schedule.rest(DWELL_S)
+                move(schedule, target)
+            schedule.go_on(DWELL_S)
     return schedule.program(LOADING_S)
 
 
@@ -120,9 +121,9 @@ def dead_weights(workspace: Workspace, rng: np.random.Generator, seconds: float)
     down = np.array([0.0, 0.0, -1.0])
     while schedule.time_s < seconds:
         theta = random_pose(workspace, rng)
-        schedule.put_on(np.zeros(6), LOADING_S)
+        schedule.go_on(LOADING_S, load=np.zeros(6))
         _approach(schedule, workspace, theta, np.zeros(6), rng)
-        schedule.rest(DWELL_S)
+        schedule.go_on(DWELL_S)
         platform = workspace.mechanism.forward(theta).platform
         point = LEVER * np.array(
             [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)]
@@ -130,8 +131,8 @@ def dead_weights(workspace: Workspace, rng: np.random.Generator, seconds: float)
         for mass in rng.permutation([0.02, 0.05, 0.1])[:2]:
             force = 9.81 * mass * down
             at = platform @ point[rng.integers(4)]
-            schedule.put_on(np.concatenate([force, np.cross(at, force)]), LOADING_S)
-            schedule.rest(DWELL_S)
+            schedule.go_on(LOADING_S, load=np.concatenate([force, np.cross(at, force)]))
+            schedule.go_on(DWELL_S)
         schedule.ambient(float(rng.uniform(-3.0, 3.0)))
     return schedule.program(LOADING_S)
 
@@ -147,13 +148,13 @@ def production(workspace: Workspace, rng: np.random.Generator, seconds: float) -
     push = weight + random_load(rng) * 0.6
     while schedule.time_s < seconds:
         for target, load in ((pick, weight), (lift, None), (above, None), (place, push)):
-            schedule.move(target, move_seconds(schedule.theta, target))
-            schedule.rest(0.3)
+            move(schedule, target)
+            schedule.go_on(0.3)
             if load is not None:
-                schedule.put_on(load, 0.4)
-                schedule.rest(0.5)
-        schedule.put_on(np.zeros(6), 0.4)
-        schedule.move(above, move_seconds(schedule.theta, above))
+                schedule.go_on(0.4, load=load)
+                schedule.go_on(0.5)
+        schedule.go_on(0.4, load=np.zeros(6))
+        move(schedule, above)
         schedule.ambient(2.0 * float(np.sin(schedule.time_s / 100.0)))
     return schedule.program(LOADING_S)
 
@@ -167,8 +168,8 @@ def heavy(workspace: Workspace, rng: np.random.Generator, seconds: float) -> Pro
     while schedule.time_s < seconds:
         theta = random_pose(workspace, rng)
         load = np.append(3.0 * FORCE * unit(rng.normal(size=3)), np.zeros(3))
-        schedule.move(theta, move_seconds(schedule.theta, theta), load)
-        schedule.rest(DWELL_S)
+        move(schedule, theta, load)
+        schedule.go_on(DWELL_S)
     return schedule.program(LOADING_S)
 
 

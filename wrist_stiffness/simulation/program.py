@@ -74,22 +74,14 @@ class Schedule:
         """Motor angles now, (2,) [rad]."""
         return self._angles[-1][1]
 
-    @property
-    def load(self) -> Array:
-        """Load now, (6,) [N, N m]."""
-        return self._loads[-1][1]
+    def go_on(self, seconds: float, theta: Array | None = None, load: Array | None = None) -> None:
+        """Move the motors to `theta` (2,) [rad] and change the load to `load` (6,) [N, N m].
 
-    def move(self, theta: Array, seconds: float, load: Array | None = None) -> None:
-        """Move the motors to `theta` (2,) [rad], with the load that is on or towards another."""
-        self._go_on(seconds, theta=theta, load=load)
-
-    def put_on(self, load: Array, seconds: float) -> None:
-        """Change the load to `load` (6,) [N, N m] at rest."""
-        self._go_on(seconds, load=load)
-
-    def rest(self, seconds: float) -> None:
-        """Let everything rest."""
-        self._go_on(seconds)
+        What is not given stays as it is.
+        """
+        self.time_s += seconds
+        self._angles.append((self.time_s, self.theta if theta is None else theta))
+        self._loads.append((self.time_s, self._loads[-1][1] if load is None else load))
 
     def ambient(self, kelvin: float) -> None:
         """Let the room drift to this temperature until now, from where it was said last [K]."""
@@ -97,16 +89,11 @@ class Schedule:
 
     def program(self, return_s: float) -> Program:
         """Return the program, closed by an unloading and a move back to its start."""
-        self.put_on(np.zeros(6), return_s)
-        self.move(self._angles[0][1], return_s)
+        self.go_on(return_s, load=np.zeros(6))
+        self.go_on(return_s, self._angles[0][1])
         self.ambient(float(self._ambient[0][1][0]))
         angles, load, ambient = (
             Track(np.array([time for time, _ in knots]), np.array([value for _, value in knots]))
             for knots in (self._angles, self._loads, self._ambient)
         )
         return Program(angles, load, ambient, self.time_s)
-
-    def _go_on(self, seconds: float, theta: Array | None = None, load: Array | None = None) -> None:
-        self.time_s += seconds
-        self._angles.append((self.time_s, self.theta if theta is None else theta))
-        self._loads.append((self.time_s, self.load if load is None else load))
