@@ -8,11 +8,10 @@ import pytest
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.simulation.base import base_laws
-from wrist_stiffness.simulation.blind import draw
 from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, is_plausible
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
-from wrist_stiffness.simulation.size import Scale, base_pose, departure, magnitude_for
+from wrist_stiffness.simulation.size import Scale, base_pose, departure, draw, magnitude_for
 
 SECONDS, RATE = 20.0, 20.0
 SETTINGS = CellSettings(rate_hz=RATE, program_seconds=SECONDS)

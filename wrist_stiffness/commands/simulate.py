@@ -18,10 +18,9 @@ from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording.messages import String
 from wrist_stiffness.sessions.refitted import SET_UP
-from wrist_stiffness.simulation.blind import Secret, draw
 from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
-from wrist_stiffness.simulation.size import Scale
+from wrist_stiffness.simulation.size import Scale, Secret, draw
 
 START_NS = 1_700_000_000_000_000_000
 """Stamp of a recording's first sample: a fixed date, so that a seed gives the same bytes."""

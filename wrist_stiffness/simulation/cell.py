@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.base import base_laws
 from wrist_stiffness.simulation.block import Rate, taken
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
-from wrist_stiffness.simulation.drive import Drive
 from wrist_stiffness.simulation.exact import ExactWrist
 from wrist_stiffness.simulation.experiment import experiment
 from wrist_stiffness.simulation.heat import HEATED
@@ -73,6 +72,58 @@ class CellSettings:
         PoseView(self.sees, self.lost_beams, np.random.default_rng(0))
 
 
+class Drive:
+    """Both motors with their position loops and encoders.
+
+    A loop is satisfied as soon as the shaft lies within half a count of what was sent: where it
+    stops there differs from move to move, and no encoder shows it.
+
+    `step`: encoder step [rad]; `rng`: belongs to the drive alone.
+    """
+
+    SETTLING_S = 0.1
+    """Time constant with which the shaft goes to another place within the count."""
+
+    SPEED_UNIT = float(np.radians(0.01))
+    """In which a drive tells its speed [rad/s]."""
+
+    def __init__(self, step: float, rng: np.random.Generator) -> None:
+        self._step = step
+        self._rng = rng
+        self._time_s: float | None = None
+        self._sent = np.zeros(2)
+        self._moving = np.zeros(2, dtype=bool)
+        self._goal = self._draw()
+        self._rest = self._goal
+
+    def shaft(self, time_s: Array, sent: Array) -> Array:
+        """Return the shaft angles (n, 2) for the next n times (n,) [s] and angles sent [rad]."""
+        out = np.empty_like(sent)
+        for i, angles in enumerate(sent):
+            if self._time_s is not None:
+                moving = angles != self._sent
+                started = moving & ~self._moving
+                if started.any():
+                    self._goal = np.where(started, self._draw(), self._goal)
+                stay = np.exp(-max(time_s[i] - self._time_s, 0.0) / self.SETTLING_S)
+                self._rest = self._goal + stay * (self._rest - self._goal)
+                self._moving = moving
+            self._time_s, self._sent = float(time_s[i]), angles
+            out[i] = angles + self._rest
+        return out
+
+    def read(self, shaft: Array) -> Array:
+        """Return what the encoders show for shaft angles (n, 2) [rad]."""
+        return self._step * np.round(shaft / self._step)
+
+    def tell(self, speed: Array) -> Array:
+        """Return the speeds that the drives tell for those (n, 2) that they see [rad/s]."""
+        return self.SPEED_UNIT * np.round(speed / self.SPEED_UNIT)
+
+    def _draw(self) -> Array:
+        return self._step * self._rng.uniform(-0.5, 0.5, 2)
+
+
 @dataclass(frozen=True)
 class CellSample:
     """What happened and what the sensors said, for one sample or n of them."""
@@ -96,16 +147,6 @@ def true_laws(table: Table, settings: CellSettings) -> list[Law]:
         *base_laws(settings.base, table, settings.base_seed, settings.session),
         *(build(hidden, table) for hidden in settings.hidden),
     ]
-
-
-def at_rests(wrist: ExactWrist, state: TrueState, rests: NDArray[np.bool_]) -> TrueState:
-    """Return the state of n samples with the exact pose where `rests` (n,) says so."""
-    rotation, shift = state.rotation.copy(), state.shift.copy()
-    for i in np.flatnonzero(rests):
-        theta = state.block.configuration.theta[i]
-        exact = wrist.solve(theta, state.block.load[i], state.block.temperature[i])
-        rotation[i], shift[i] = exact.rotation, exact.shift
-    return replace(state, rotation=rotation, shift=shift)
 
 
 class VirtualCell:
@@ -166,7 +207,12 @@ class VirtualCell:
         load, room = self.program.load(phase), self.program.ambient(phase)[:, 0]
         true = self._wrist.run(time_s, shaft, load, room)
         if self.settings.truth == "exact":
-            true = at_rests(self._exact, true, self._rest_ends(time_s))
+            for i in np.flatnonzero(self._rest_ends(time_s)):
+                block = true.block
+                exact = self._exact.solve(
+                    block.configuration.theta[i], block.load[i], block.temperature[i]
+                )
+                true.rotation[i], true.shift[i] = exact.rotation, exact.shift
         encoder, wrench, rotation, shift = self._readings(time_s, shaft, load, true)
         noise = self._pose_noise(time_s)
         # A tracker's errors in position and orientation are separate, not one rigid motion.

@@ -1,4 +1,4 @@
-"""How large an effect is in the data, and the magnitude that gives a wanted size.
+"""How large an effect is in the data, the magnitude of a wanted size, and what a seed hides.
 
 size = sqrt(mean over samples of xi' Sigma^-1 xi / 6), xi being the change of the residual twist by
 the effect over all samples that are loaded or moving, less its mean; Sigma is the covariance of
@@ -7,7 +7,7 @@ one sample: that of the pose instrument, and a hidden encoder count spread over 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,18 +15,25 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.components import ELASTIC, Array
-from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.simulation.block import joined
-from wrist_stiffness.simulation.catalogue import ALL, HiddenEffect
+from wrist_stiffness.simulation.catalogue import ALL, CATALOGUE, HiddenEffect, places
 from wrist_stiffness.simulation.cell import CellSample, CellSettings, VirtualCell
-from wrist_stiffness.simulation.equilibrium import Pose
+from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise, instrument
+from wrist_stiffness.simulation.wrist import TrueWrist
 
 SIZE_TOLERANCE = 2e-3
 """Relative, of the size that `magnitude_for` reaches."""
 
 MAX_TRIALS = 40
+
+SMALLEST, LARGEST = 0.5, 30.0
+"""Range of the sizes that `draw` draws, even in their logarithm."""
+
+ATTEMPTS = 20
+"""Of `draw`, to find an effect that can be as large as was drawn."""
 
 FASTEST_HZ = 200.0
 """Sizes of faster experiments are found at this rate: no law's size depends on more."""
@@ -35,36 +42,28 @@ BLOCK = 2000
 """Samples whose operators and inner state are in memory at a time."""
 
 
-@dataclass(frozen=True)
-class BasePose:
-    """Poses (n) that the base predicts: rotation (n, 3, 3) U -> F, and place (n, 3) of O [m]."""
-
-    rotation: Array
-    shift: Array
+BasePose = tuple[Array, Array]
+"""Poses (n) that the base predicts: rotation (n, 3, 3) U -> F, and place (n, 3) of O [m]."""
 
 
 def base_pose(table: Table, encoder: Array, wrench: Array) -> BasePose:
     """Return where the platform would be by the base alone.
 
     `encoder` (n, 2): motor angles [rad]; `wrench` (n, 6): load on the platform at O in F [N, N m].
-    Gives `BasePose`: of n samples.
     """
-    rotations, shifts = [], []
-    for first in range(0, len(encoder), BLOCK):
-        rows = slice(first, first + BLOCK)
-        configuration = table.mechanism.forward(encoder[rows])
-        pose = Pose(configuration, table.components, table.geometry.gravity)
-        screws = np.zeros((len(configuration.theta), len(ELASTIC), 6))
-        bent, moved = exp_twist(pose.solve(wrench[rows], screws).twist)
-        rotations.append(bent @ configuration.platform)
-        shifts.append(moved)
-    return BasePose(np.concatenate(rotations), np.concatenate(shifts))
+    wrist, still = TrueWrist(table, ()), np.zeros((len(encoder), len(HEATED)))
+    blocks = [slice(first, first + BLOCK) for first in range(0, len(encoder), BLOCK)]
+    true = [wrist.at(still[rows, 0], encoder[rows], wrench[rows], still[rows]) for rows in blocks]
+    return (
+        np.concatenate([each.rotation for each in true]),
+        np.concatenate([each.shift for each in true]),
+    )
 
 
 def departure(rotation: Array, shift: Array, base: BasePose) -> Array:
     """Return log(T T_base^-1) at O in F for poses T, (n, 6) [m, rad]."""
-    turn = rotation @ np.swapaxes(base.rotation, -1, -2)
-    return log_motion(turn, shift - (turn @ base.shift[..., None])[..., 0])
+    turn = rotation @ np.swapaxes(base[0], -1, -2)
+    return log_motion(turn, shift - (turn @ base[1][..., None])[..., 0])
 
 
 def sample_covariance(table: Table, theta: Array, name: str) -> Array:
@@ -214,3 +213,49 @@ def magnitude_for(
             following = 0.5 * (low + high)
         magnitude = following
     return None
+
+
+@dataclass(frozen=True)
+class Secret:
+    """What a seed hides and nobody is told: a blind test."""
+
+    hidden: HiddenEffect  # with its magnitude
+    size: float  # in units of one sample's noise
+
+
+def draw(
+    seed: int,
+    table: Table,
+    settings: CellSettings,
+    seconds: float,
+    tell: Callable[[str], None] = lambda text: None,
+    without: Collection[str] = (),
+) -> Secret:
+    """Draw effect, place, form and size.
+
+    Every effect of the catalogue is as likely as any other, then every place of it.  A drawn size
+    that its effect cannot have on a wrist that still works is drawn again with all the rest.
+
+    `seed`: not negative.  `settings`: the size holds for this experiment.  `seconds`: duration of
+    the experiment [s].  `tell`: is told before every run of the experiment; not what is tried.
+    `without`: effects that are not drawn, such as those that every session sets up anew.  Raises
+    `InputError` if the seed is negative or nothing fits after many draws.
+    """
+    if seed < 0:
+        raise InputError(f"blind seed {seed} is negative")
+    # Apart from the noise, which a user may seed with the same number.
+    rng = np.random.default_rng([seed, 0x5EC2E7])
+    scale = Scale(table, replace(settings, hidden=()), seconds, tell)
+    names = [name for name in CATALOGUE if name not in without]
+    for _ in range(ATTEMPTS):
+        entry = CATALOGUE[effect := str(rng.choice(names))]
+        found = places({effect: entry})
+        _, component, form = found[rng.integers(len(found))]
+        size = float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
+        shape = int(rng.integers(2**31))
+        hidden = HiddenEffect(effect, component, form, entry.plausible, shape)
+        try:
+            return Secret(scale.sized(hidden, size, entry.largest), size)
+        except InputError:
+            continue
+    raise InputError(f"blind seed {seed}: no effect fits this experiment after {ATTEMPTS} draws")
