@@ -13,8 +13,8 @@ from wrist_stiffness.lookup.table import Evaluation
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.error_model import Load, Prediction
+from wrist_stiffness.model.evaluation import FIRST_ORDER_LIMIT
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.model.stages import FIRST_ORDER_LIMIT
 from wrist_stiffness.simulation.exact import ExactWrist
 
 

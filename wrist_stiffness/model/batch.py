@@ -12,10 +12,17 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.evaluation import Evaluated, evaluate, evaluate_beside, seen_by
+from wrist_stiffness.model.evaluation import (
+    NO_GUESSES,
+    Evaluated,
+    Guesses,
+    Memory,
+    evaluate,
+    evaluate_beside,
+    seen_by,
+)
 from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.prediction import BlockPrediction
-from wrist_stiffness.model.stages import NO_GUESSES, Guesses, Memory
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -109,7 +116,7 @@ def _predicted(
         chosen = slice(number * CHUNK, (number + 1) * CHUNK)
         part, own = usable.take(chosen), rows[chosen]
         first = recent.chunk(number, partial(evaluate, models[0], part, memories[0], near=guess))
-        guesses.append(first.staged.guesses)
+        guesses.append(first.guesses)
         beside = max(1, STACK // len(part))
         groups = [slice(begin, begin + beside) for begin in range(1, len(models), beside)]
         for group in (slice(0, 1), *groups):

@@ -17,10 +17,9 @@ from wrist_stiffness.mechanism.energy import component_wrenches
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
+from wrist_stiffness.model.evaluation import Advanced, evaluate, evaluate_beside
 from wrist_stiffness.model.law import Contribution
 from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.stages import Advanced
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
         covariance,
         configuration.platform,
         result.warnings,
-        tuple(each.effect.name for each in result.staged.advanced if each and _remembers(each)),
+        tuple(each.effect.name for each in result.advanced if each and _remembers(each)),
     )
 
 

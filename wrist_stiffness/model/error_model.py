@@ -26,13 +26,12 @@ from wrist_stiffness.model.batch import Recent, predicted
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.contribution import Constants
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.evaluation import constant_of, evaluate, home_of
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.session import Session
-from wrist_stiffness.model.situation import lengths
-from wrist_stiffness.model.stages import AtHome, constants_of, share
+from wrist_stiffness.model.situation import Situation, lengths
 
 IN_F, IN_U = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
 
@@ -89,33 +88,71 @@ class ErrorModel:
         return replace(self, evaluation=evaluation)
 
     def with_effects(self, *effects: Effect) -> ErrorModel:
-        """Return the model with these effects instead of its own."""
-        return replace(self, effects=effects)
+        """Return the model with these effects instead of its own.
+
+        What follows from effects that both have is the same object: so an evaluation knows it.
+        """
+        other = replace(self, effects=effects)
+        same_parts = self._of_parts == other._of_parts
+        if same_parts:
+            vars(other).update(parts=self.parts, home=self.home)
+        known = self._at_home
+        # Only a user's own law may look at the parts.
+        kept = {
+            id(each): known[id(each)]
+            for each in effects
+            if id(each) in known and (same_parts or not each.law.foreign)
+        }
+        constant = [each for each in effects if each.law.constant]
+        if len(kept) == len(constant) == len(known):
+            vars(other).update(_at_home=known, constants=self.constants)
+        else:
+            vars(other)["_at_home"] = {
+                id(each): kept.get(id(each)) or constant_of(each, other.home) for each in constant
+            }
+        return other
+
+    @property
+    def _of_parts(self) -> list[Effect]:
+        return [effect for effect in self.effects if effect.stage == "parts"]
 
     @cached_property
     def parts(self) -> ElasticComponents:
         """Elastic parts of the table with the effects that change them."""
         parts = self.table.components
-        for effect in self.effects:
+        for effect in self._of_parts:
             parts = effect.law.changed(parts, self.table.geometry, effect.component, effect.si)
         return parts
 
     @cached_property
-    def constants(self) -> Constants:
-        """What the constant effects add together."""
-        return constants_of(self.effects, self.parts, AtHome(self.table))
+    def home(self) -> Situation:
+        """The wrist with these parts at home, unloaded and at rest."""
+        return home_of(self.table, self.parts)
 
     @cached_property
-    def changing(self) -> tuple[Effect, ...]:
-        """Effects that are neither constant nor part of the elastic parts."""
-        return tuple(e for e in self.effects if not (e.law.constant or e.stage == "parts"))
+    def _at_home(self) -> dict[int, Constants]:
+        """What each constant effect adds, by its identity."""
+        return {id(e): constant_of(e, self.home) for e in self.effects if e.law.constant}
+
+    @cached_property
+    def constants(self) -> Constants:
+        """What the constant effects add together."""
+        return sum(self._at_home.values(), Constants())
+
+    @cached_property
+    def changing(self) -> dict[str, list[int]]:
+        """Positions of the effects that are neither constant nor of the elastic parts, by stage."""
+        found: dict[str, list[int]] = {}
+        for n, effect in enumerate(self.effects):
+            if not (effect.law.constant or effect.stage == "parts"):
+                found.setdefault(effect.stage, []).append(n)
+        return found
 
     @cached_property
     def _load_shares(self) -> tuple[float | None, ...]:
         """What the changing effects add as a share of the said load, None for anything else."""
-        return tuple(
-            None if each.law.foreign else each.law.load_share(each.si) for each in self.changing
-        )
+        changing = [self.effects[n] for own in self.changing.values() for n in own]
+        return tuple(None if e.law.foreign else e.law.load_share(e.si) for e in changing)
 
     @cached_property
     def compiled(self) -> CompiledWrist | None:
@@ -140,14 +177,12 @@ class ErrorModel:
         Those of effects in `joint` are left out.
         """
         together = () if self.joint is None else self.joint.effects
-        moved = [
+        return tuple(
             self.with_effects(*self.effects[:number], other, *self.effects[number + 1 :])
             for number, effect in enumerate(self.effects)
             if effect.name not in together
             for other in effect.varied
-        ]
-        share([self, *moved])
-        return tuple(moved)
+        )
 
     @cached_property
     def relative_error(self) -> float:
@@ -323,10 +358,10 @@ class ErrorModel:
         list of BlockPrediction
             One for each addition.
         """
-        models = [self.with_effects(*self.effects, *e) for e in additions]
+        first = self.with_effects(*self.effects, *additions[0])
         if recent is not None:
-            models[0] = recent.like(models[0])
-        share(models)
+            first = recent.like(first)
+        models = [first, *(first.with_effects(*self.effects, *e) for e in additions[1:])]
         return predicted(models, block, self.accepts(block), near, recent)
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:

@@ -2,74 +2,148 @@
 
 0 <= lambda  perpendicular to  g0 + B' W + sum_k N_k delta_k + A lambda >= 0
 xi = C W + sum_k G_k delta_k + B lambda
+
+Models at one block often share effects.  What an effect did is taken over where the other one saw
+the same thing: the same object, with the same state.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from operator import is_
+from pathlib import Path
+from traceback import extract_tb
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.compiled import CompiledWrist
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.contact import solve_contacts
 from wrist_stiffness.mechanism.vectors import both_halves
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.block_statics import BlockStatics
-from wrist_stiffness.model.contribution import NOTHING, Contribution
-from wrist_stiffness.model.prediction import seen
-from wrist_stiffness.model.situation import Situation
-from wrist_stiffness.model.stages import (
-    NO_GUESSES,
-    Guesses,
-    Memory,
-    Staged,
-    staged,
-    with_speeds,
+from wrist_stiffness.model.contribution import (
+    LEFT_OUT,
+    NOTHING,
+    Constants,
+    Contribution,
+    MissingSignalError,
 )
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.law import STAGES
+from wrist_stiffness.model.memory import slope
+from wrist_stiffness.model.prediction import seen
+from wrist_stiffness.model.situation import Situation, lengths
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
 
+FIRST_ORDER_LIMIT = 2e-3
+"""A screw that turns by more than this has left first order [rad]."""
+
+SAMPLE_STAGES = STAGES[1:]
+
+Guesses = Mapping[str, Any]
+NO_GUESSES: Guesses = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What an evaluation leaves for the next block."""
+
+    states: tuple[Any, ...]  # state of each effect
+    time: float  # of the last sample [s]
+    theta: Array  # (2,), its motor angles [rad]
+    active: NDArray[np.bool_]  # (m,), its contact state
+
+
+@dataclass(frozen=True, eq=False)
+class Advanced:
+    """What one effect did at a block."""
+
+    effect: Effect  # which one
+    at: Situation  # what it saw
+    # `before`, `after`: its state
+    before: Any
+    added: Contribution  # what it added
+    after: Any
+    warnings: tuple[str, ...]  # that it lacks a signal, or that it is past first order
+
+    @property
+    def left(self) -> Any:
+        """What the next block gets of the state."""
+        guesses = self.effect.law.state_is_a_guess and self.after is not None
+        return self.after.last if guesses else self.after
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """Result of an evaluation of n samples."""
+    """What a model's effects did at a block of n samples, and to the platform."""
 
-    staged: Staged  # what the effects did
-    twist: Array  # (n, 6), pose error of the platform, first order in every screw [m, rad]
-    force: Array  # (n, m), contact forces [N]
-    active: NDArray[np.bool_]  # (n, m), contact state
+    situations: tuple[Situation, ...]  # before the first stage, and after each one
+    # of each effect; None for constant ones, which were put together before
+    advanced: tuple[Advanced | None, ...]
+    warnings: tuple[str, ...]  # effects without their signals, and effects past first order
 
     @property
     def situation(self) -> Situation:
         """With all that the effects added."""
-        return self.staged.last
+        return self.situations[-1]
 
     @property
-    def contributions(self) -> tuple[Contribution, ...]:
-        """What each effect added; nothing for constant ones."""
-        return tuple(NOTHING if each is None else each.added for each in self.staged.advanced)
+    def twist(self) -> Array:
+        """Pose error of the platform, first order in every screw, (n, 6) [m, rad]."""
+        return self.situation.answer[0]
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Effects without their signals, and effects past first order."""
-        return self.staged.warnings
+    def force(self) -> Array:
+        """Contact forces, (n, m) [N]."""
+        return self.situation.answer[1]
 
     @property
-    def memory(self) -> Memory:
-        """What is left for the next block."""
-        return self.staged.memory(self.active)
+    def active(self) -> NDArray[np.bool_]:
+        """Contact state, (n, m)."""
+        return self.situation.answer[2]
 
     @cached_property
     def measured(self) -> Array:
         """What the pose sensor says of the twist, composed exactly, (n, 6) [m, rad]."""
         return seen(self.twist, *self.situation.sensor)
+
+    @property
+    def contributions(self) -> tuple[Contribution, ...]:
+        """What each effect added; nothing for constant ones."""
+        return tuple(NOTHING if each is None else each.added for each in self.advanced)
+
+    @property
+    def memory(self) -> Memory:
+        """What is left for the next block."""
+        block = self.situation.block
+        states = tuple(None if each is None else each.left for each in self.advanced)
+        return Memory(states, float(block.time[-1]), block.theta[-1], self.active[-1])
+
+    @cached_property
+    def known(self) -> dict[int, Advanced]:
+        """What the effects did, by their identities."""
+        return {id(each.effect): each for each in self.advanced if each is not None}
+
+    @cached_property
+    def guesses(self) -> Guesses:
+        """Where the effects whose states are guesses ended, by their names."""
+        every = self.known.values()
+        return {e.effect.name: e.after for e in every if e.effect.law.state_is_a_guess}
+
+    def added(self, stage: str) -> list[Contribution]:
+        """Return what the effects of a stage added."""
+        return [each.added for each in self.known.values() if each.effect.stage == stage]
 
 
 def evaluate(
@@ -84,12 +158,12 @@ def evaluate(
     `block`: n > 0 samples inside the table's domain and load range; `memory`: what the block before
     left, None at the start; `pose`: the configuration of a block of one sample, where it is known;
     `near`: where effects whose states are guesses ended at this block before, by their names.
-    Gives `Evaluated`: for n samples.
     """
+    if block.theta_dot is None:
+        before = None if memory is None else (memory.time, memory.theta)
+        block = replace(block, theta_dot=slope(block.time, block.theta, before)[0])
     guess = None if memory is None else memory.active
-    start = situation_of(model, with_speeds(block, memory), guess, pose)
-    found = staged(model, start, memory, near=near)
-    return Evaluated(found, *found.last.answer)
+    return _staged(model, situation_of(model, block, guess, pose), memory, None, near)
 
 
 def evaluate_beside(
@@ -104,30 +178,31 @@ def evaluate_beside(
     model.
     """
     every = [
-        staged(model, _start(model, like), memory, like.staged)
+        _staged(model, _start(model, like), memory, like, like.guesses)
         for model, memory in zip(models, memories, strict=True)
     ]
-    statics = like.situation.statics
-    if like.situation.wrist is not None:
-        return [Evaluated(each, *each.last.answer) for each in every]
-    alike = [each for each in every if each.last.statics is statics]
-    together = iter(_settled_alike([each.last for each in alike], like) if alike else ())
-    return [
-        Evaluated(each, *(next(together) if each.last.statics is statics else each.last.answer))
-        for each in every
-    ]
+    at = like.situation
+    open_ones = [each.situation for each in every if "answer" not in vars(each.situation)]
+    alike = [other for other in open_ones if other.statics is at.statics]
+    if alike and at.wrist is None:
+        gaps = np.stack([other.free[1] for other in alike], axis=1)
+        force, active = solve_contacts(at.operators.approach, gaps, like.active[:, None])
+        pushed = force @ np.swapaxes(at.operators.force_twist, -1, -2)
+        for t, other in enumerate(alike):
+            vars(other)["answer"] = other.free[0] + pushed[:, t], force[:, t], active[:, t]
+    return every
 
 
 def _start(model: ErrorModel, like: Evaluated) -> Situation:
     """Return the situation in which a model begins beside another one."""
-    start = like.staged.situations[0]
-    wrist = None if start.wrist is None else _wrist(model, start.wrist[1])
+    start = like.situations[0]
+    if start.parts is model.parts and start.constants is model.constants:
+        return start
+    statics = start.statics
     if start.parts is not model.parts:
-        statics = start.statics.with_parts(model.parts)
-        return Situation(statics, model.constants, guess=like.active, wrist=wrist)
-    if start.constants is not model.constants:
-        return replace(start, constants=model.constants, guess=like.active, wrist=wrist)
-    return start
+        statics = statics.with_parts(model.parts)
+    wrist = None if start.wrist is None else _wrist(model, start.wrist[1])
+    return Situation(statics, model.constants, guess=like.active, wrist=wrist)
 
 
 def situation_of(
@@ -150,18 +225,6 @@ def _wrist(model: ErrorModel, pose: Configuration) -> tuple[CompiledWrist, Confi
     return None if model.compiled is None else (model.compiled, pose)
 
 
-def _settled_alike(
-    every: Sequence[Situation], like: Evaluated
-) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
-    """Return the same of situations with the same statics as another one."""
-    operators = like.situation.operators
-    free = [at.free for at in every]
-    gaps = np.stack([gap for _, gap in free], axis=1)
-    force, active = solve_contacts(operators.approach, gaps, like.active[:, None])
-    pushed = force @ np.swapaxes(operators.force_twist, -1, -2)
-    return [(twist + pushed[:, t], force[:, t], active[:, t]) for t, (twist, _) in enumerate(free)]
-
-
 def seen_by(results: Sequence[Evaluated]) -> Array:
     """Return what the pose sensor says of t results at the same n samples, (t, n, 6) [m, rad]."""
     twist = np.stack([each.twist for each in results])
@@ -175,3 +238,110 @@ def _stacked(sides: Sequence[Array | None]) -> Array | None:
         return None
     rows = [np.zeros((1, 6)) if side is None else np.atleast_2d(side) for side in sides]
     return np.stack(np.broadcast_arrays(*rows))
+
+
+def _staged(
+    model: ErrorModel,
+    start: Situation,
+    memory: Memory | None,
+    like: Evaluated | None,
+    near: Guesses,
+) -> Evaluated:
+    """Carry a model's effects through the stages.
+
+    `start`: the block with what the constant effects add; `memory`: what the block before left,
+    None at the start; `like`: another model at the same block; `near`: where effects whose states
+    are guesses ended at this block before, by their names.
+    """
+    states = memory.states if memory else (None,) * len(model.effects)
+    advanced: list[Advanced | None] = [None] * len(model.effects)
+    situations, warnings = [start], list(model.constants.warnings)
+    for number, stage in enumerate(SAMPLE_STAGES):
+        at, added = situations[-1], []
+        for n in model.changing.get(stage, ()):
+            found = _advanced(model.effects[n], at, states[n], like, near)
+            advanced[n] = found
+            added.append(found.added)
+            warnings += found.warnings
+        situations.append(_after(at, added, like, number))
+    return Evaluated(tuple(situations), tuple(advanced), tuple(warnings))
+
+
+def _advanced(
+    effect: Effect, at: Situation, state: Any, like: Evaluated | None, near: Guesses
+) -> Advanced:
+    # A user's own law may write into its state.
+    known = None if like is None or effect.law.foreign else like.known.get(id(effect))
+    if known is not None and known.at is at and known.before is state:
+        return known
+    guess = near.get(effect.name)
+    try:
+        before = state if guess is None else guess.after(state)
+        added, after = _advanced_by(effect, at, before)
+    except MissingSignalError as missing:
+        lacking = f"{effect.name}: {missing.signal}{LEFT_OUT}"
+        return Advanced(effect, at, state, NOTHING, state, (lacking,))
+    return Advanced(effect, at, state, added, after, _first_order(effect, added))
+
+
+def _after(
+    at: Situation, added: Sequence[Contribution], like: Evaluated | None, number: int
+) -> Situation:
+    """Return the situation after a stage."""
+    if not added:
+        return at
+    if like is not None and like.situations[number] is at:
+        other = like.added(SAMPLE_STAGES[number])
+        if len(other) == len(added) and all(map(is_, other, added)):
+            return like.situations[number + 1]
+    return at.with_more(sum(added, at.given))
+
+
+def home_of(table: Table, parts: ElasticComponents) -> Situation:
+    """Return the wrist at home, unloaded and at rest."""
+    block = Block(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 6)), np.zeros((1, 2)))
+    at = table.mechanism.forward(block.theta)
+    return Situation(BlockStatics(block, block.load, at, "closed_form", table, parts))
+
+
+def constant_of(effect: Effect, home: Situation) -> Constants:
+    """Return what a constant effect adds at home."""
+    added, _ = _advanced_by(effect, home, None)
+    return Constants.of_home(effect.component, added, _first_order(effect, added))
+
+
+def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contribution, Any]:
+    """Call a law; whatever goes wrong in a user's own becomes an error that names it."""
+    if not effect.law.foreign:
+        return effect.law.advance(at, effect.component, effect.si, state)
+    try:
+        added, state = effect.law.advance(at, effect.component, effect.si, state)
+        added.check(len(at.block), len(at.parts.sectors.gap))
+    except MissingSignalError:
+        raise
+    except WristError as error:
+        raise InputError(f"{effect.name}: {error}") from error
+    except (Exception, SystemExit) as error:
+        told = f"{effect.name}: {type(error).__name__}: {error}"
+        raise InputError(told + _line_in(effect.law.file, error)) from error
+    return added, state
+
+
+def _line_in(file: Path | None, error: BaseException) -> str:
+    """Return which line of a user's own file an error came through last, empty for none."""
+    lines = [at.lineno for at in extract_tb(error.__traceback__) if Path(at.filename) == file]
+    return f" ({file.name}, line {lines[-1]})" if file is not None and lines else ""
+
+
+def _first_order(effect: Effect, added: Contribution) -> tuple[str, ...]:
+    turned = [
+        float(np.max(lengths(screw[:, 3:])))
+        for screw in (added.limb_1, added.limb_2, added.both)
+        if screw is not None
+    ]
+    if turned and max(turned) > FIRST_ORDER_LIMIT:
+        return (
+            f"{effect.name}: turns by {1e3 * max(turned):.2f} mrad, past the first order "
+            f"({1e3 * FIRST_ORDER_LIMIT:g} mrad) in which it is carried",
+        )
+    return ()

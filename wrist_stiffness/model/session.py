@@ -11,9 +11,8 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Sample
-from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
+from wrist_stiffness.model.evaluation import Memory, evaluate, evaluate_beside
 from wrist_stiffness.model.prediction import Prediction
-from wrist_stiffness.model.stages import Memory
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
