@@ -36,6 +36,7 @@ from cases import Case, one_each
 from observe import hidden_effects, observe
 from rates import wilson
 from right_sentences import is_right, right_components
+from told import binned, calibration_error
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.proposal import Proposal
@@ -97,6 +98,7 @@ def answer(case: Case) -> dict[str, Any]:
     found = propose(problem, fit)
     line |= {"cpu_s": time.process_time() - begun, "probability": found.probability}
     line["laws"] = [each.sentence for each in found.terms]
+    line["probabilities"] = [each.probability for each in found.terms]
     line["forms"] = [each.form.name for each in found.terms]
     line["components"] = [each.component for each in found.terms]
     if case.effects:
@@ -104,6 +106,9 @@ def answer(case: Case) -> dict[str, Any]:
         right = right_components(effect, place)
         line["right_component"] = any(each.component in right for each in found.terms)
         line["right_sentence"] = is_right(effect, place, found.terms)
+        # Of the second law the probability is that both are right.
+        right_ones = [is_right(effect, place, [each]) for each in found.terms]
+        line["right_laws"] = np.logical_and.accumulate(right_ones).tolist()
         line["among_components"] = any(name in right for name in found.places)
         both = WristProblem(model, (whole,))
         line |= judged(both, held, added(problem, found.terms))
@@ -228,16 +233,16 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
                 hits = sum(each[what] for each in kept)
                 rows.append(_rate(f"{whose}: {what.replace('_', ' ')}", hits, len(kept)))
     rows.append(_rate("sound wrists: no law", sum(not x["laws"] for x in sound), len(sound)))
-    for low, high in ((0.95, 1.01), (0.3, 0.95), (0.0, 0.3)):
-        told = [each for each in strange if each["laws"] and low <= each["probability"] < high]
-        hits = sum(each["right_sentence"] for each in told)
-        rows.append(
-            _rate(
-                f"told with {100 * low:.0f} to {100 * min(high, 1.0):.0f} %: right sentence",
-                hits,
-                len(told),
-            )
-        )
+    told = [
+        (probability, right)
+        for each in strange
+        for probability, right in zip(each["probabilities"], each["right_laws"], strict=True)
+    ]
+    probabilities, right = map(np.array, zip(*told, strict=True))
+    off = calibration_error(probabilities, right)
+    rows.append(f"calibration error of the probabilities of {len(told)} laws: {off:.2f}")
+    for mean, count, hits in binned(probabilities, right):
+        rows.append(_rate(f"laws told with {100.0 * mean:.0f} % on average: right", hits, count))
     for whose, kept in (("strangers", strange), ("sound wrists", sound)):
         times = [each["cpu_s"] for each in kept if "cpu_s" in each] or [0.0]
         rows.append(

@@ -134,6 +134,7 @@ def test_what_answers_to_both_speeds_is_one_law_that_can_be_added(model, day, tm
     assert law.sentence.startswith("at tool or whatever pulls and turns with the platform: ")
     assert "rad/s of theta_dot_1; " in law.sentence
     again = found.lines("there/proposed_1.yaml", ["day"])
+    assert again[1] == "   explains 100 % of the error above the noise; over 99 % sure"
     assert "--name proposed_2 --fit day -o proposed_2.yaml" in again[2]
     words = law.command("m.yaml", ["day"])
     assert "'size_Nmm * theta_dot_1, size_Nmm * theta_dot_2'" in words
@@ -215,6 +216,20 @@ def test_a_shift_and_a_turn_together_are_one_law_that_can_be_added(model, day):
     assert "mdeg about" in law.sentence
     added = extend(model, law.effect("dent"), [session])
     assert added.after.rmse(added.quantities[0]) < 0.8 * added.before.rmse(added.quantities[0])
+
+
+def test_a_law_beside_something_that_follows_none_is_told_as_less_sure(model, day):
+    """What a law leaves above the noise may as well be what is missing itself."""
+    lift = model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * clamp_bar"
+    text = "wild_um * sin(23 * theta_1) * sin(19 * theta_2)"
+    wild = FormulaLaw("wild", "frame", np.eye(6)[2], text, (), ("wild_um",))
+    beside = effect_at(wild, "frame", {"wild_um": 6.0})
+    sure, unsure = (
+        proposed(model, planted(*lift, *others, lift_um=2.0)).terms[0] for others in ((), (beside,))
+    )
+    assert sure.formula == unsure.formula == "size_um * clamp_bar"
+    assert sure.probability > 0.98
+    assert unsure.probability < 0.8
 
 
 def test_what_is_otherwise_beyond_a_line_across_the_workspace(model, day):

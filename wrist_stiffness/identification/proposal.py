@@ -165,6 +165,10 @@ class Proposal:
         }
 
 
+def _percent(probability: float) -> str:
+    return "over 99 %" if probability > 0.99 else f"{100.0 * probability:.0f} %"
+
+
 def _words(row: Array, key: str) -> str:
     """Return the direction of a shift or a turn in words, `along +z`."""
     turns = key in TURNING
@@ -238,7 +242,8 @@ class Proposals:
             name = f"proposed_{number}"
             out.append(f"{'Proposed law' if number == first else 'And'}: {each.sentence}.")
             of = "what the first leaves above it" if number > first else "the error above the noise"
-            out.append(f"   explains {100.0 * each.explains:.0f} % of {of}")
+            sure = f"{_percent(each.probability)} sure{' of both' if number > first else ''}"
+            out.append(f"   explains {100.0 * each.explains:.0f} % of {of}; {sure}")
             for place, effect in enumerate(named if number == first else (), 1):
                 target = f"found_{place}.yaml"
                 words = ["extend", model, "--effect", effect, "--fit", *recordings, "-o", target]
@@ -246,10 +251,8 @@ class Proposals:
                 model = target
             out.append(f"   {each.command(model, recordings, name)}")
             model = f"{name}.yaml"
-        others = [f"   or ({100.0 * e.probability:.0f} %) {e.sentence}" for e in self.rivals]
-        if others:
-            sure = 100.0 * self.terms[0].probability
-            out += [f"   {sure:.0f} % sure that it is this one", *others]
+        if self.rivals:
+            out += [f"   or ({_percent(e.probability)}) {e.sentence}" for e in self.rivals]
             out.append(f"   to tell the first two apart: {self.tells_apart}")
         return out
 

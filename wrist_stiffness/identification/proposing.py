@@ -61,10 +61,10 @@ class _Judged:
     log: float
     price: float
 
-    @property
-    def stands_in(self) -> float:
-        """Probability that it only looks like what is missing."""
-        return stands_in(self.state.rest(PROPOSED)) if self.state.unexplained > 0.0 else 0.0
+    def stands_in(self, before: Evidence) -> float:
+        """Return the probability that it only looks like what is missing beside a fit."""
+        had = before.unexplained
+        return stands_in(self.state.unexplained / had) if had else 0.0
 
 
 def propose(
@@ -102,8 +102,8 @@ def propose(
         logs = np.array([each.log - base.log for each in found])
         chances = np.exp(logs - np.logaddexp(0.0, logsumexp(logs)))
         something = float(chances.sum())
-        # A law of another shape than the truth leaves some of itself.
-        chances *= [1.0 - each.stands_in for each in found]
+        # Among so many laws one always comes near; what is not the truth leaves some of it.
+        chances *= [1.0 - each.stands_in(base) for each in found]
         if first is None:
             first = found, chances, base
         if something < naming:
