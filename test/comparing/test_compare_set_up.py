@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.comparing import set_up as fitted_anew
 from wrist_stiffness.comparing.compare import compare_models
-from wrist_stiffness.comparing.set_up import refit_set_up, refitted_values
+from wrist_stiffness.comparing.set_up import without_set_up
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import observe
+from wrist_stiffness.sessions.unit_session import all_units
 
 POSES = 60
 NOISE = np.repeat([0.3e-6, 3e-6], 3)
@@ -49,12 +49,11 @@ def session(model, instrument=INSTRUMENT, target=TARGET, zero=(0, 0), tare=0.0, 
 
 def left(model, measured, calibrated=()):
     """Set-up and what it leaves, in standard deviations of each unit's noise."""
-    observed = observe(model, [measured])
-    (set_up,) = refit_set_up(model, observed, calibrated)
+    observed, after, (set_up,) = without_set_up(model, all_units(model, [measured]), calibrated)
     scatter = NOISE / np.sqrt(observed.observations.samples)[:, None]
     # Moments in motion are told to a tenth of a micrometre only: their load is smoothed.
     dwell = observed.sessions[0].cut.dwell
-    return set_up, (refitted_values(observed, [set_up]) / scatter)[dwell]
+    return set_up, (after.values / scatter)[dwell]
 
 
 def rms(values):
@@ -154,12 +153,11 @@ def test_the_bow_of_a_target_a_millimetre_off_is_no_error_of_a_motion(model):
     measured = MeasuredSession(
         "day", block, shift, jitter @ INSTRUMENT[0] @ turned @ TARGET[0], np.diag(NOISE**2)
     )
-    observed = observe(model, [measured])
-    (set_up,) = refit_set_up(model, observed)
+    observed, after, _ = without_set_up(model, all_units(model, [measured]))
     scatter = NOISE / np.sqrt(observed.observations.samples)[:, None]
     moving = ~observed.sessions[0].cut.dwell
     assert moving.sum() > 100
-    assert rms((refitted_values(observed, [set_up]) / scatter)[moving]) < 1.3
+    assert rms((after.values / scatter)[moving]) < 1.3
 
 
 def test_a_model_that_is_wrong_is_not_believed_the_more_the_longer_it_is_recorded():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,6 +27,24 @@ BLOCKS = 10
 
 LEAST = 0.01
 """Share of the square of the error below which a condition is named and no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A group of the discrepancy that is there."""
+
+    group: Group
+    amplitude: float
+    wrong: bool  # whether it is more than an instrument's usual drift
+    places: np.ndarray  # (k,), of its columns among all of the state
+    own: Array  # (u, 6, k), what its columns do by themselves
+    seen: Array  # (u, 6, k), what they do beyond what the fit would have taken up
+    values: Array  # (k,), of the columns
+
+    @property
+    def drifts(self) -> bool:
+        """Whether it is an instrument's drift."""
+        return self.group.expected > 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +84,34 @@ class Explained:
         return dependences(self.point, self.table.background)
 
     @cached_property
+    def parts(self) -> dict[int, Part]:
+        """Those groups by their places in the background."""
+        state = self.answer.state
+        flat = self.columns.reshape(-1, self.columns.shape[2])
+        weighted = self.weights.reshape(-1, 1) * flat
+        information = weighted.T @ flat + np.diag(self.point.weight**2)
+        named = flat.shape[1]
+        found, first = {}, named
+        for at, number in enumerate(self.answer.chosen):
+            group = self.table.background.groups[number]
+            units = np.eye(group.columns.shape[1])
+            own = np.stack([group.change(unit) for unit in units], axis=2)
+            own = without_mounting(self.observations, own)
+            taken = np.linalg.solve(information, weighted.T @ own.reshape(len(flat), -1))
+            places = np.arange(first, first + len(units))
+            found[number] = Part(
+                group,
+                float(state.amplitude[at]),
+                bool(state.discrepant[at]),
+                places,
+                own,
+                self.columns @ taken - own,
+                state.unnamed[places - named],
+            )
+            first += len(units)
+        return found
+
+    @cached_property
     def error(self) -> dict[str, float]:
         """RMS of what is left, by the key of the quantity."""
         return self.observations.rms(np.nan_to_num(self.observations.values) ** 2)
@@ -78,10 +124,8 @@ class Explained:
     @cached_property
     def drift(self) -> dict[str, float]:
         """What an instrument's usual drift makes of it."""
-        state = self.answer.state
-        pairs = zip(self.answer.chosen, state.discrepant, strict=True)
-        usual = [n for n, wrong in pairs if self._drifts(n) and not wrong]
-        return self._rms(self._fitted(usual)) if usual else dict.fromkeys(self.error, 0.0)
+        usual = [each for each in self.parts.values() if each.drifts and not each.wrong]
+        return self._rms(self._fitted(usual))
 
     @property
     def usual_drift(self) -> dict[str, float]:
@@ -91,14 +135,13 @@ class Explained:
     @cached_property
     def above(self) -> dict[str, float]:
         """What is left above noise and drift, RMS."""
-        answer, found = self.answer, {}
-        rest = self._rms(np.nan_to_num(self.observations.values - self._fitted(answer.chosen)))
+        parts, found = self.parts.values(), {}
+        rest = self._rms(np.nan_to_num(self.observations.values - self._fitted(parts)))
         for quantity in self.observations.reported:
-            pairs = zip(answer.chosen, answer.state.discrepant, strict=True)
-            own = [n for n, bad in pairs if bad and self._group(n).quantity == quantity.name]
             key = quantity.key
+            own = [each for each in parts if each.wrong and each.group.quantity == quantity.name]
             square = self._rms(self._fitted(own))[key] ** 2
-            if answer.state.misfit:
+            if self.answer.state.misfit:
                 square += max(rest[key] ** 2 - self.noise[key] ** 2, 0.0)
             found[key] = float(np.sqrt(square))
         return found
@@ -111,17 +154,14 @@ class Explained:
             for each in self.answer.found
             if each.probability >= NAMING
         ]
-        state = self.answer.state
-        pairs = zip(self.answer.chosen, state.discrepant, strict=True)
-        drifts = [at for at, (n, wrong) in enumerate(pairs) if wrong and self._drifts(n)]
+        drifts = {n: each for n, each in self.parts.items() if each.wrong and each.drifts}
         if drifts:
-            groups = [state.background.groups[at] for at in drifts]
-            away = [
-                np.log(state.amplitude[at] / group.expected) / group.width
-                for at, group in zip(drifts, groups, strict=True)
-            ]
-            shown = self._shown(tuple(self.answer.chosen[at] for at in drifts))
-            found.append(Told({PASSING_DRIFT: 1.0}, float(ndtr(max(away))), *shown))
+            away = max(
+                np.log(each.amplitude / each.group.expected) / each.group.width
+                for each in drifts.values()
+            )
+            shown = self._shown(tuple(drifts))
+            found.append(Told({PASSING_DRIFT: 1.0}, float(ndtr(away)), *shown))
         noise = {key: max(size, 1e-12) for key, size in self.noise.items()}
         return tuple(
             sorted(found, key=lambda t: -sum((s / noise[k]) ** 2 for k, s in t.sizes.items()))
@@ -162,75 +202,33 @@ class Explained:
     @cached_property
     def reachable(self) -> dict[str, float]:
         """RMS that the laws of the conditions leave of stretches that they have not seen."""
-        answer, table, values = self.answer, self.table, self.observations.values
-        state, groups = answer.state, [self._group(n) for n in answer.chosen]
+        state, table, values = self.answer.state, self.table, self.observations.values
+        groups = [each.group for each in self.parts.values()]
         if not groups:
             return self.error
         columns = np.concatenate([each.columns for each in groups], axis=1)
         known = self.point.left + self.point.columns @ state.step
-        law = np.concatenate(
-            [
-                np.zeros(len(g.columns.T)) if g.expected else np.ones(len(g.columns.T))
-                for g in groups
-            ]
-        )
+        sizes = [group.columns.shape[1] for group in groups]
+        # What only drifts is no law.
+        law = np.repeat([0.0 if group.expected else 1.0 for group in groups], sizes)
         information = columns.T @ columns / state.excess + np.diag(state.precision[-len(law) :])
         slope = columns.T @ known / state.excess
         blocks = time_blocks(self.observations.sessions, min(BLOCKS, self.observations.n_units))
         left = values + self.columns @ state.step
-        ends = np.cumsum([len(each.columns.T) for each in groups])
         for block in np.unique(blocks):
             own = columns[blocks[table.unit] == block]
             seen = information - own.T @ own / state.excess
-            # What only drifts is no law.
             step = -law * np.linalg.solve(
                 seen, slope - own.T @ known[blocks[table.unit] == block] / state.excess
             )
-            for group, part in zip(groups, np.split(step, ends[:-1]), strict=True):
+            for group, part in zip(groups, np.split(step, np.cumsum(sizes)[:-1]), strict=True):
                 left[blocks == block] += group.change(part)[blocks == block]
         after = self.observations.rms(np.nan_to_num(left) ** 2)
         return {key: min(size, after[key]) for key, size in self.error.items()}
 
-    def _group(self, number: int) -> Group:
-        return self.table.background.groups[number]
-
-    def _drifts(self, number: int) -> bool:
-        return self._group(number).expected > 0.0
-
-    def _places(self, number: int) -> np.ndarray:
-        """Places of a group's columns among all of the state."""
-        at = self.answer.chosen.index(number)
-        sizes = self.answer.state.background.sizes
-        first = self.point.columns.shape[1] + int(sizes[:at].sum())
-        return np.arange(first, first + int(sizes[at]))
-
-    def _seen(self, number: int) -> Array:
-        """Return what a group's columns do beyond what the fit would have taken up, (u, 6, k)."""
-        own = self._own(number)
-        return np.asarray(self.columns @ self._absorbed(own) - own)
-
-    def _own(self, number: int) -> Array:
-        """Return what a group's columns do by themselves, (u, 6, k)."""
-        group = self._group(number)
-        units = np.eye(group.columns.shape[1])
-        own = np.stack([group.change(unit) for unit in units], axis=2)
-        return without_mounting(self.observations, own)
-
-    def _absorbed(self, change: Array) -> Array:
-        """Return what the fit would have taken for changes (u, 6, k), (p, k)."""
-        flat = self.columns.reshape(-1, self.columns.shape[2])
-        weighted = self.weights.reshape(-1, 1) * flat
-        information = weighted.T @ flat + np.diag(self.point.weight**2)
-        taken = np.linalg.solve(information, weighted.T @ change.reshape(len(flat), -1))
-        return np.asarray(taken)
-
-    def _fitted(self, numbers: Sequence[int]) -> Array:
+    def _fitted(self, parts: Iterable[Part]) -> Array:
         """Part of what is left that goes with some groups, (u, 6)."""
-        state, out = self.answer.state, np.zeros_like(self.observations.values)
-        named = self.point.columns.shape[1]
-        for n in numbers:
-            out += self._seen(n) @ state.unnamed[self._places(n) - named]
-        return out
+        return sum((each.seen @ each.values for each in parts), np.zeros_like(self.weights))
 
     def _rms(self, values: Array) -> dict[str, float]:
         return self.observations.rms(values**2)
@@ -238,30 +236,30 @@ class Explained:
     def _shown(self, numbers: tuple[int, ...]) -> tuple[dict[str, float], Curve]:
         """Return what goes with the groups of one condition, and how to show it."""
         quantities = {q.name: q for q in self.observations.reported}
-        own = [quantities[self._group(n).quantity].key for n in numbers]
-        every = self._rms(self._fitted(numbers))
+        parts = [self.parts[n] for n in numbers]
+        own = [quantities[each.group.quantity].key for each in parts]
+        every = self._rms(self._fitted(parts))
         # Parts may cancel each other; none is told as more than the whole.
         sizes = {key: min(every[key], self.error[key]) for key in own}
-        noise = {key: max(self.noise[key], 1e-12) for key in own}
-        strongest = numbers[int(np.argmax([sizes[key] / noise[key] for key in own]))]
-        quantity = quantities[self._group(strongest).quantity]
-        shown = [n for n in numbers if self._group(n).quantity == quantity.name]
-        places = np.concatenate([self._places(n) for n in shown])
-        others = [n for n in self.answer.chosen if n not in shown]
-        asked = {q.name: q for q in finer_questions(self.observations.covariates)}
-        name = self._group(strongest).name
-        state = self.answer.state
-        conditions = asked[name].conditions if name in asked else ("time_s",)
-        values = state.unnamed[places - self.point.columns.shape[1]]
-        seen = np.concatenate([self._seen(n) for n in shown], axis=2)
+        over = [sizes[key] / max(self.noise[key], 1e-12) for key in own]
+        strongest = parts[int(np.argmax(over))].group
+        shown = [each for each in parts if each.group.quantity == strongest.quantity]
+        asked = {q.name: q.conditions for q in finer_questions(self.observations.covariates)}
+        conditions = asked.get(strongest.name, ("time_s",))
+        values = np.concatenate([each.values for each in shown])
+        seen = np.concatenate([each.seen for each in shown], axis=2)
+        others = [each for each in self.parts.values() if each not in shown]
         left = self.observations.values - self._fitted(others)
         if len(conditions) == 1:
             # A law of one condition is shown as it is, with what the fit took of it.
-            alone = -np.concatenate([self._own(n) for n in shown], axis=2)
+            alone = -np.concatenate([each.own for each in shown], axis=2)
             left, seen = left + (alone - seen) @ values, alone
-        covariance = state.covariance[np.ix_(places, places)]
-        curve = curve_of(self.observations, quantity, conditions, left, seen, values, covariance)
-        return sizes, curve
+        places = np.concatenate([each.places for each in shown])
+        covariance = self.answer.state.covariance[np.ix_(places, places)]
+        quantity = quantities[strongest.quantity]
+        return sizes, curve_of(
+            self.observations, quantity, conditions, left, seen, values, covariance
+        )
 
 
 def explain(

@@ -94,49 +94,33 @@ class SetUp:
         return f"{self.session}: {', '.join(parts)}"
 
 
-def refit_set_up(
-    model: ErrorModel, observed: Observed, calibrated: Sequence[str] = ()
-) -> tuple[SetUp, ...]:
-    """Fit the set-up of every session anew.
-
-    `calibrated`: effects among `GROUPS` that the recordings say were calibrated: they stay.
-    """
-    ends = np.cumsum([len(each) for each in observed.sessions])
-    parts = np.split(observed.predicted, ends[:-1])
-    free = np.ones(len(PLAUSIBLE), dtype=bool)
-    gauges = observed.sessions[0].gauges is not None
-    for effect in (*calibrated, *(REGISTRATIONS if gauges else ())):
-        free[GROUPS.get(effect, slice(0))] = False
-    return tuple(
-        _refit(model, session, predicted, free)
-        for session, predicted in zip(observed.sessions, parts, strict=True)
-    )
-
-
 def without_set_up(
     model: ErrorModel,
     sessions: tuple[UnitSession, ...],
-    calibrated: Sequence[str],
+    calibrated: Sequence[str] = (),
     predicted: Array | None = None,
 ) -> tuple[Observed, Observations, tuple[SetUp, ...]]:
     """Return what a model leaves of units, what a set-up fitted anew leaves of that, and the fit.
 
-    `model`: predicts; `sessions`: in the order of time; `calibrated`: as in `refit_set_up`;
-    `predicted` (u, 6): what the model predicts of all units, where that is known already [m, rad].
+    `sessions`: in the order of time; `calibrated`: effects among `GROUPS` that the recordings say
+    were calibrated: they stay; `predicted` (u, 6): what the model predicts of all units, where that
+    is known already [m, rad].
     """
     if predicted is None:
         predicted = np.concatenate([predict_units(model, each) for each in sessions])
     observed = tabulate(model, sessions, predicted)
-    set_ups = refit_set_up(model, observed, calibrated)
-    left = observed.observations.with_values(refitted_values(observed, set_ups))
-    return observed, left, set_ups
-
-
-def refitted_values(observed: Observed, set_ups: Sequence[SetUp]) -> Array:
-    """Return what the set-ups leave of the units of the table, (u, 6) [m, rad]."""
+    free = np.ones(len(PLAUSIBLE), dtype=bool)
+    gauges = sessions[0].gauges is not None
+    for effect in (*calibrated, *(REGISTRATIONS if gauges else ())):
+        free[GROUPS.get(effect, slice(0))] = False
+    parts = np.split(observed.predicted, np.cumsum([len(each) for each in sessions])[:-1])
+    set_ups = tuple(
+        _refit(model, session, part, free) for session, part in zip(sessions, parts, strict=True)
+    )
     left = np.concatenate([each.residual for each in set_ups])
-    seen = np.concatenate([np.isfinite(each.values) for each in observed.sessions])
-    return np.asarray(left[(seen & np.isfinite(left)).any(axis=1)])
+    seen = np.concatenate([np.isfinite(each.values) for each in sessions])
+    in_table = (seen & np.isfinite(left)).any(axis=1)
+    return observed, observed.observations.with_values(left[in_table]), set_ups
 
 
 def _refit(model: ErrorModel, session: UnitSession, predicted: Array, free: Mask) -> SetUp:
