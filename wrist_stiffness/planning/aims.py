@@ -66,19 +66,14 @@ class Aims:
     everything: bool
 
     @cached_property
-    def at_most(self) -> tuple[Answer, ...]:
-        """Answers of `LONGER` times the pool."""
-        total = self.start + LONGER * self.pool.total
-        best = discrimination(total, self.pool.layout, self.goals, self.start)
-        return tuple(
-            Answer(goal, float(d), bool(d >= needed(goal)))
-            for goal, d in zip(self.goals, best, strict=True)
-        )
+    def at_most(self) -> Array:
+        """Gram matrix (q, q) of `LONGER` times the pool."""
+        return self.start + LONGER * self.pool.total
 
     @cached_property
     def reachable(self) -> tuple[Goal, ...]:
         """What the choice is for."""
-        found = [each.goal for each in self.at_most if each.reachable]
+        found = [each.goal for each in self.answers(self.at_most) if each.settled]
         if self.everything:
             found = nearest(found, discrimination(self.pool.total, self.pool.layout, found))
         return tuple(found)
@@ -99,10 +94,13 @@ class Aims:
 
     def answers(self, gram: Array) -> tuple[Answer, ...]:
         """Return the answers of an experiment with a Gram matrix (q, q), `start` in it."""
-        found = discrimination(gram, self.pool.layout, self.goals, self.start)
+        found, best = (
+            discrimination(each, self.pool.layout, self.goals, self.start)
+            for each in (gram, self.at_most)
+        )
         return tuple(
-            Answer(best.goal, float(d), best.reachable)
-            for best, d in zip(self.at_most, found, strict=True)
+            Answer(goal, float(d), bool(most >= needed(goal)))
+            for goal, d, most in zip(self.goals, found, best, strict=True)
         )
 
 

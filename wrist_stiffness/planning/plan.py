@@ -93,7 +93,7 @@ def plan(
     before = [evaluated(model, question, e, conditions.noise, next(stages))[0] for e in earlier]
     own = aims(known, before, question, rng)
     if not own.reachable and not whole:
-        return Plan(None, (), own.at_most, lacking, {})
+        return Plan(None, (), own.answers(own.at_most), lacking, {})
     chosen = choose(
         pool.by_unit(own.pool.grams),
         pool.cost_s,

@@ -151,7 +151,7 @@ class _Clock:
         self._time_s, self._theta, self._load = 0.0, HOME, NO_LOAD
         self._samples: list[tuple[float, Array, Array, AppliedLoad]] = []
         self._observed: list[tuple[int, int, bool]] = []
-        self._dwells: list[tuple[float, Visit, AppliedLoad, Array, float, str]] = []
+        self._dwells: list[tuple[float, Visit, AppliedLoad, int, float, str]] = []
         self._knots: list[int] = []
         self._ends: list[float] = []
         self._knot()
@@ -187,21 +187,15 @@ class _Clock:
         platform = self._workspace.mechanism.platform_rotation(angles)
         wrench = np.array([load.wrench(turn) for load, turn in zip(loads, platform, strict=True)])
         block = Block(np.array(time), angles, wrench, np.array(speed))
-        rows, visit, moving = (
-            np.array(column, dtype=kind)
-            for column, kind in zip(
-                zip(*self._observed, strict=True), (np.intp, np.intp, bool), strict=True
-            )
-        )
-        turns = self._workspace.mechanism.forward(np.array([each[3] for each in self._dwells]))
+        rows, visit, moving = np.array(self._observed, dtype=np.intp).T
         dwells = tuple(
-            Dwell(at, each, load, load.wrench(turn), hold_s, purpose)
-            for (at, each, load, _, hold_s, purpose), turn in zip(
-                self._dwells, turns.platform, strict=True
-            )
+            Dwell(begin, each, load, wrench[at], hold_s, purpose)
+            for begin, each, load, at, hold_s, purpose in self._dwells
         )
         knots = tuple((time[i], angles[i], wrench[i]) for i in self._knots)
-        return Timeline(block, rows, visit, moving, dwells, knots, np.array(self._ends))
+        return Timeline(
+            block, rows, visit, moving.astype(bool), dwells, knots, np.array(self._ends)
+        )
 
     def _sample(self, theta: Array, speed: Array) -> int:
         self._samples.append((self._time_s, theta, speed, self._load))
@@ -237,11 +231,11 @@ class _Clock:
 
     def _rest(self, number: int, visit: Visit, hold_s: float, purpose: str) -> None:
         begin = self._time_s
-        self._dwells.append((begin, visit, self._load, self._theta, hold_s, purpose))
         for part in LONG_HOLD if hold_s >= LONG_S else (1.0,):
             self._time_s = begin + part * hold_s
             at = self._sample(self._theta, np.zeros(2))
             self._observed.append((at, number, False))
+        self._dwells.append((begin, visit, self._load, at, hold_s, purpose))
         self._time_s = begin + hold_s
         self._knot()
 
