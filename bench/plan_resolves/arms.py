@@ -89,7 +89,8 @@ class Arms:
         """Return what random poses need, measured like planned ones, and the measurements."""
         rng = np.random.default_rng([self.case.seed, 1])
         settings = draw_settings(WORKSPACE, LOADS, TABLE.geometry.gravity, rng)
-        visits = [setting.visits(PACE.dwell_s)[rng.integers(2)] for setting in settings]
+        settings = [replace(setting, hold_s=PACE.dwell_s) for setting in settings]
+        visits = [(each, each.from_other_side)[rng.integers(2)] for each in settings]
         for count in (FEW, EXTRA):
             extra = self.performed(visits[:count])
             needed = self.needed(extra, [count])

@@ -58,4 +58,4 @@ def test_load_and_approach_stay_as_they_were(pairs):
     for drawn, moved in pairs:
         assert moved.load is drawn.load
         assert np.array_equal(moved.approach, drawn.approach)
-        assert (moved.carried, moved.speeds) == (drawn.carried, drawn.speeds)
+        assert (moved.carried, moved.speed) == (drawn.carried, drawn.speed)

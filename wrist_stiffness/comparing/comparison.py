@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from wrist_stiffness.comparing.curve import since_start_s
 from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import as_values, percent
 from wrist_stiffness.identification.questions import LOAD
@@ -252,14 +253,11 @@ def worst_poses(
             chosen.append(unit)
         if len(chosen) == most:
             break
-    start = {
-        int(number): float(observations.times[observations.sessions == number].min())
-        for number in np.unique(observations.sessions)
-    }
+    since_s = since_start_s(observations)
     return tuple(
         WorstPose(
             sessions[observations.sessions[unit]],
-            float(observations.times[unit]) - start[int(observations.sessions[unit])],
+            float(since_s[unit]),
             np.degrees(theta[unit]),
             load[unit],
             {key: float(error[unit]) for key, error in errors.items()},

@@ -179,11 +179,15 @@ def condition_shown(observations: Observations, name: str) -> Array:
     """Return a condition by name in the unit of its label, (u,)."""
     values = observations.covariate(name)
     if name == "time_s":
-        starts = [
-            observations.times[observations.sessions == s].min() for s in observations.sessions
-        ]
-        return np.asarray((observations.times - starts) / 60.0)
+        return since_start_s(observations) / 60.0
     return values * _unit(name)[2]
+
+
+def since_start_s(observations: Observations) -> Array:
+    """Return the time since the first unit of the same session, (u,) [s]."""
+    starts = np.full(observations.sessions.max() + 1, np.inf)
+    np.minimum.at(starts, observations.sessions, observations.times)
+    return np.asarray(observations.times - starts[observations.sessions])
 
 
 def _unit(name: str) -> tuple[str, str, float]:

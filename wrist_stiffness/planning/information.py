@@ -157,18 +157,21 @@ def carried_over(known: Information, names: Sequence[str]) -> Array:
     gram, layout = known.total, known.layout
     own = np.concatenate([layout.nuisances[name] for name in names if name in layout.nuisances])
     rest = np.setdiff1d(np.arange(len(gram)), own)
-    inner = gram[np.ix_(own, own)] + np.diag(layout.prior[own])
-    cross = gram[np.ix_(own, rest)]
+    order = np.concatenate([own, rest])
     left = np.zeros_like(gram)
-    left[np.ix_(rest, rest)] = gram[np.ix_(rest, rest)] - cross.T @ np.linalg.solve(inner, cross)
+    left[np.ix_(rest, rest)] = _beyond(gram[np.ix_(order, order)], layout.prior[own])
     return left
 
 
 def beyond_nuisances(gram: Array, layout: Layout) -> Array:
     """Return what the nuisances leave of Gram matrices (..., q, q), (..., q - p, q - p)."""
-    p = len(layout.prior)
-    inner = gram[..., :p, :p] + np.diag(layout.prior)
-    cross = gram[..., :p, p:]
+    return _beyond(gram, layout.prior)
+
+
+def _beyond(gram: Array, prior: Array) -> Array:
+    """Return what the first p columns leave of the others; `prior` (p,): their precisions."""
+    p = len(prior)
+    inner, cross = gram[..., :p, :p] + np.diag(prior), gram[..., :p, p:]
     left: Array = gram[..., p:, p:] - np.swapaxes(cross, -1, -2) @ np.linalg.solve(inner, cross)
     return left
 

@@ -144,7 +144,8 @@ class _Pool:
         self._fixed = fixed_visits(settings, pace)
         if not whole:
             settings += [moved_outward(setting, workspace) for setting in settings]
-        self._visits = [visit for setting in settings for visit in setting.visits(pace.dwell_s)]
+        settings = [replace(setting, hold_s=pace.dwell_s) for setting in settings]
+        self._visits = [visit for each in settings for visit in (each, each.from_other_side)]
         self.in_unit = 2 if whole else 1
         order = rng.permutation(len(self._visits))
         ordered = [*(self._visits[i] for i in order), *self._fixed]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +12,15 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.geometry import Limits
 from wrist_stiffness.mechanism.workspace import Workspace
 from wrist_stiffness.planning.loads_file import NO_LOAD, AppliedLoad, Source
-from wrist_stiffness.planning.timeline import HOME, Pace, Timeline, Visit, run_through, straight
+from wrist_stiffness.planning.timeline import (
+    HOME,
+    SPEEDS,
+    Pace,
+    Timeline,
+    Visit,
+    run_through,
+    straight,
+)
 
 POOL = 100
 """Settings to choose from."""
@@ -36,34 +44,14 @@ OUTWARD_STEPS = 30
 """Radii that are tried for a setting that is moved outward."""
 
 
-@dataclass(frozen=True, eq=False)
-class Setting:
-    """A pose under a load, visited from both sides."""
-
-    theta: Array  # (2,), motor angles [rad]
-    # (2,), sense of the first visit's approach, the second one comes from the other side
-    approach: Array
-    load: AppliedLoad  # what is put on
-    carried: bool  # whether the load is put on before the approach
-    speeds: tuple[float, float]  # of both visits, shares of the allowed speed
-
-    def visits(self, dwell_s: float) -> tuple[Visit, Visit]:
-        """Return the visits from both sides."""
-        first, second = (
-            Visit(self.theta, side * self.approach, self.load, self.carried, speed, dwell_s)
-            for side, speed in zip((1.0, -1.0), self.speeds, strict=True)
-        )
-        return first, second
-
-
 def draw_settings(
     workspace: Workspace, sources: Sequence[Source], gravity: Array, rng: np.random.Generator
-) -> list[Setting]:
+) -> list[Visit]:
     """Draw the pool: random poses, without load or with one that the user can apply.
 
-    `gravity` (3,): in F [m/s^2].  Gives about `POOL`.  Raises `InputError` if home or the way to it
-    from either side is out of the table's domain; `LoadRangeError` if a source has no load within
-    the table's range at any pose.
+    `gravity` (3,): in F [m/s^2].  Gives about `POOL` visits, each from one side.  Raises
+    `InputError` if home or the way to it from either side is out of the table's domain;
+    `LoadRangeError` if a source has no load within the table's range at any pose.
     """
     if not _approachable(workspace, HOME, np.ones(2)):
         raise InputError("plan: the home pose is not inside the table's domain")
@@ -77,14 +65,13 @@ def draw_settings(
     settings = []
     for theta, source in zip(poses, chosen, strict=True):
         approach = rng.choice([-1.0, 1.0], 2)
-        speeds = rng.permutation([1.0, 0.5])
+        speed = float(rng.permutation(SPEEDS)[0])
         carried = bool(rng.uniform() < 0.5)
         load = NO_LOAD
         if source is not None:
             load = _draw_load(source, workspace, theta, approach, gravity, rng)
         carried = carried and load is not NO_LOAD
-        shares = float(speeds[0]), float(speeds[1])
-        settings.append(Setting(theta, approach, load, carried, shares))
+        settings.append(Visit(theta, approach, load, carried, speed))
     for source in sources:
         if not any(setting.load.name == source.name for setting in settings):
             raise LoadRangeError(
@@ -94,7 +81,7 @@ def draw_settings(
     return settings
 
 
-def moved_outward(setting: Setting, workspace: Workspace) -> Setting:
+def moved_outward(setting: Visit, workspace: Workspace) -> Visit:
     """Return a setting as far from home as the workspace lets it be visited with its load.
 
     Most effects differ most where the motors have turned far, which random poses seldom have.
@@ -168,7 +155,7 @@ def within(wrench: Array, limits: Limits) -> bool:
     return bool(np.all(sizes <= limits.most_load))
 
 
-def fixed_visits(settings: Sequence[Setting], pace: Pace) -> list[Visit]:
+def fixed_visits(settings: Sequence[Visit], pace: Pace) -> list[Visit]:
     """Return what every plan has: one visit of the reference pose, and the two long holds.
 
     The holds are under the largest loads of different poses, one put on at rest and one carried
@@ -178,7 +165,7 @@ def fixed_visits(settings: Sequence[Setting], pace: Pace) -> list[Visit]:
     by_size = sorted(settings, key=lambda s: -float(np.linalg.norm(s.load.force)))
     holds = [
         replace(
-            setting.visits(pace.dwell_s)[0],
+            setting,
             hold_s=max(HOLD_S, pace.dwell_s),
             carried=setting.load is not NO_LOAD and carried,
             purpose="long hold",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,9 @@ LONG_HOLD = (0.03, 0.1, 0.3, 1.0)
 
 LONG_S = 10.0
 
+SPEEDS = (1.0, 0.5)
+"""Shares of the allowed speed at which the two sides of a pose are visited."""
+
 
 @dataclass(frozen=True, eq=False)
 class Visit:
@@ -65,6 +68,11 @@ class Visit:
     def before(self) -> Array:
         """Where the last move begins, (2,) [rad]."""
         return self.theta - APPROACH * self.approach
+
+    @property
+    def from_other_side(self) -> Visit:
+        """The same from the other side, at the other one of `SPEEDS`."""
+        return replace(self, approach=-self.approach, speed=sum(SPEEDS) - self.speed)
 
 
 @dataclass(frozen=True, eq=False)

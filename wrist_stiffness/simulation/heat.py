@@ -8,6 +8,8 @@ the room.  The constants are assumed, of the size of a 150 mm aluminium and stee
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
@@ -59,7 +61,6 @@ class HeatNetwork:
         self._kelvin = np.zeros(len(HEATED))
         self._time_s: float | None = None
         self._angles = np.zeros(2)
-        self._steps: dict[float, Array] = {}
 
     def run(self, time_s: Array, angles: Array, room: Array) -> Array:
         """Return the temperatures above the reference at the next n times.
@@ -76,14 +77,12 @@ class HeatNetwork:
                 speed = np.abs(angles[i] - self._angles) / dt
                 heat[:2] = STANDBY_W + RUNNING_W * (speed / FULL_SPEED) ** 2
                 driven = CAPACITY * self._kelvin + dt * (heat + TO_ROOM * room[i])
-                self._kelvin = self._step(dt) @ driven
+                self._kelvin = _step(dt) @ driven
             self._time_s, self._angles = float(now), angles[i]
             out[i] = self._kelvin
         return out
 
-    def _step(self, dt: float) -> Array:
-        if dt not in self._steps:
-            if len(self._steps) > 64:
-                self._steps.clear()
-            self._steps[dt] = np.asarray(np.linalg.inv(np.diag(CAPACITY) + dt * CONDUCTANCE))
-        return self._steps[dt]
+
+@lru_cache(maxsize=64)
+def _step(dt: float) -> Array:
+    return np.asarray(np.linalg.inv(np.diag(CAPACITY) + dt * CONDUCTANCE))
