@@ -26,11 +26,6 @@ from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.laws.joint_friction import JointFriction
 from wrist_stiffness.simulation.laws.law import Bending, Law
 
-# fmt: off
-FRAMES = (
-    "pin_1", "pin_2", "wall_2", "pin_5", "pin_4", "wall_4", "hub_4", "pin_3", "wall_3", "platform",
-)
-# fmt: on
 ENDS = {
     "link_1": ("pin_1", "pin_2"),
     "link_2": ("pin_5", "pin_4"),
@@ -50,8 +45,10 @@ PAIRS = {
 }
 """Frames that a cylindrical pair joins."""
 
+_JOINED = (*ENDS.values(), *PAIRS.values())
+FRAMES = tuple(dict.fromkeys(frame for two in _JOINED for frame in two if frame != "ground"))
 _NUMBER = {frame: i for i, frame in enumerate((*FRAMES, "ground"))}
-_NEAR, _FAR = np.array([[_NUMBER[f] for f in two] for two in (*ENDS.values(), *PAIRS.values())]).T
+_NEAR, _FAR = np.array([[_NUMBER[frame] for frame in two] for two in _JOINED]).T
 """Number of the near and of the far frame of each component, then of each pair, (11,)."""
 
 _HEAVY = np.concatenate([_NEAR[: len(ELASTIC)], _FAR[: len(ELASTIC)], [_NUMBER["platform"]]])
