@@ -224,8 +224,7 @@ def rest_lines(result: Diagnosis) -> list[str]:
     if not result.depends_on:
         return []
     left = ", ".join(
-        f"{key.rpartition('_')[0]} {size:.2g} {key.rpartition('_')[2]}"
-        for key, size in result.discrepancy.items()
+        f"{_name(key)} {size:.2g} {_unit(key)}" for key, size in result.discrepancy.items()
     )
     causes = ", ".join(f"{name} ({percent(part)})" for name, part in result.depends_on.items())
     return [f"Left above the noise: {left}. It depends on {causes}."]

@@ -44,8 +44,13 @@ def calibration_lines(found: Calibrated) -> list[str]:
     parts["of this wrist:"] = told_lines(each for each in parameters if each.session is None)
     for title, part in parts.items():
         lines += ["", title, *(part or ["  nothing identifiable"])]
-    if far := far_lines(result.fit, parameters):
-        lines += ["", "farther off than typical, to be checked on the machine:", *far]
+    checks = {
+        each.effect.name: each.effect.law.check.replace("{place}", each.effect.component)
+        for each in result.fit.problem.free
+    }
+    if far := [each for each in parameters if each.far]:
+        lines += ["", "farther off than typical, to be checked on the machine:"]
+        lines += [f"  {p.effect} {p.key}: {tolerances(p)}; {checks[p.effect]}" for p in far]
     if untold := untold_lines(result.fit, parameters):
         lines += ["", "not identifiable from these recordings:", *untold]
     if result.calibrated:
@@ -80,13 +85,22 @@ def _judged_lines(
     judged_by: str,
     rows: Mapping[str, Mapping[str, float]],
 ) -> list[str]:
-    """Tell what a fit saw, its errors as a table, and how they were judged."""
+    """Tell what a fit saw, its errors as a table, how they were judged, and how much is left."""
     cells = [
         [name, *(f"{row[key]:.3f}" for key in fit.noise)]
         for name, row in {**rows, "noise and drift alone": fit.noise}.items()
     ]
     table = Table("", ["", *(TITLES.get(key, key) for key in fit.noise)], cells)
-    return [*used_lines(sessions, fit), "", *table.lines(), *left_lines(fit, judged_by)]
+    left = "remaining error: no more than the noise"
+    if fit.rough:
+        above = " and ".join(
+            f"{fit.discrepancy[q.key]:.3g} {q.unit} of {q.name}"
+            for q in fit.problem.table.reported
+            if fit.discrepancy[q.key] > 0.0
+        )
+        left = f"remaining error above the noise: {above}: {NOT_AT_THE_FLOOR}"
+    judged = f"judged {JUDGED_BY[judged_by]}"
+    return [*used_lines(sessions, fit), "", *table.lines(), judged, left]
 
 
 def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
@@ -105,19 +119,6 @@ def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
     return lines
 
 
-def left_lines(found: Fit, judged_by: str) -> list[str]:
-    """Tell how an error was judged, and how much more than noise is left."""
-    lines = [f"judged {JUDGED_BY[judged_by]}"]
-    if not found.rough:
-        return [*lines, "remaining error: no more than the noise"]
-    above = " and ".join(
-        f"{found.discrepancy[q.key]:.3g} {q.unit} of {q.name}"
-        for q in found.problem.table.reported
-        if found.discrepancy[q.key] > 0.0
-    )
-    return [*lines, f"remaining error above the noise: {above}: {NOT_AT_THE_FLOOR}"]
-
-
 def told_lines(
     parameters: Iterable[FittedParameter], all_of_them: bool = False, usual: bool = True
 ) -> list[str]:
@@ -134,19 +135,6 @@ def told_lines(
             line = f"  {each.effect:30} {each.key:24}{plus_minus(each.value, each.sigma):>22}"
             lines.append(f"{line}   {', '.join(notes)}".rstrip())
     return lines
-
-
-def far_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]:
-    """Tell what went farther than usual, and what to look at on the machine."""
-    checks = {
-        each.effect.name: each.effect.law.check.replace("{place}", each.effect.component)
-        for each in found.problem.free
-    }
-    return [
-        f"  {each.effect} {each.key}: {tolerances(each)}; {checks[each.effect]}"
-        for each in parameters
-        if each.far
-    ]
 
 
 def untold_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]:
