@@ -7,8 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from wrist_stiffness.recording.message import MSG_LINE
-from wrist_stiffness.recording.messages import MESSAGE_TYPES
+from wrist_stiffness.recording.messages import MESSAGE_TYPES, MSG_LINE
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.cell_simulator import CellSimulator
 from wrist_stiffness.ros.model_monitor import ModelMonitor

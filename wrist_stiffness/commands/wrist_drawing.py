@@ -16,8 +16,8 @@ from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import frame_about, triad
-from wrist_stiffness.recording.batch import Layout, Leaf, layout_of
-from wrist_stiffness.recording.cdr import encode
+from wrist_stiffness.recording.cdr import Leaf, encode
+from wrist_stiffness.recording.fixed_layout import FixedLayout
 from wrist_stiffness.recording.messages import (
     ColorRGBA,
     Header,
@@ -79,7 +79,7 @@ class WristDrawing:
         plate = geometry.platform
         # A cylinder stands along its own z.
         self._upright = np.roll(frame_about(plate.normal), -1, axis=1)
-        self._templates: dict[int, tuple[bytes, Layout, dict[str, list[Leaf]]]] = {}
+        self._templates: dict[int, tuple[bytes, FixedLayout[Any], dict[str, list[Leaf]]]] = {}
 
     def payloads(
         self, stamps: NDArray[np.int64], configuration: Configuration, twist: Array
@@ -120,14 +120,14 @@ class WristDrawing:
                 found[place] = row.tobytes().replace(length * b"#", texts[place].encode())
         return found
 
-    def _template(self, length: int) -> tuple[bytes, Layout, dict[str, list[Leaf]]]:
+    def _template(self, length: int) -> tuple[bytes, FixedLayout[Any], dict[str, list[Leaf]]]:
         """Return what stays in pictures with a legend of this length, and where their numbers are.
 
         The numbers of points, and of a pose's place and turn, follow one another.
         """
         if length not in self._templates:
             payload = encode(MarkerArray(self._markers(length * "#")))
-            layout = layout_of(MarkerArray, payload)
+            layout = FixedLayout(MarkerArray, payload)
             leaves = {leaf.path.removeprefix("markers."): [leaf] for leaf in layout.leaves}
             leaves[STAMPS] = [leaf for leaf in layout.leaves if leaf.path.endswith(STAMPS)]
             self._templates[length] = payload, layout, leaves

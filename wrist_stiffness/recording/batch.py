@@ -3,13 +3,11 @@
 The messages of a topic mostly differ in their numbers only: names, frame and the lengths of their
 sequences stay.  Then each number sits at the same byte in every payload, and NumPy reads a whole
 column.  Payloads that differ in more form groups of their own, down to a group of one.  Joint
-states come as arrays eleven times as fast as one by one, sixteen times as fast as from rosbags
-(`bench/recording_speed.py`).
+states come as arrays sixteen times as fast as from rosbags (`bench/recording_speed.py`).
 """
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,17 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.recording.cdr import (
-    ENCAPSULATION_SIZE,
-    PRIMITIVES,
-    ByteOrder,
-    byte_order_of,
-    decode,
-    padding,
-)
+from wrist_stiffness.recording.fixed_layout import FixedLayout
 from wrist_stiffness.recording.mcap_chunk import Payloads
 from wrist_stiffness.recording.messages import Message
-from wrist_stiffness.recording.schema import SECONDS_NANOSECONDS, fields_of
 
 # More layouts than this in one call gain nothing from columns.
 _MAX_LAYOUTS = 8
@@ -63,12 +53,11 @@ def decode_batches(
     while remaining.size:
         template = bytes(payloads[remaining[0]])
         try:
-            first = decode(message_type, template)
+            layout = FixedLayout(message_type, template)
         except RecordingError:
             undecodable.append(int(remaining[0]))
             remaining = remaining[1:]
             continue
-        layout = layout_of(message_type, template)
         same_length = remaining[lengths[remaining] == len(template)]
         if len(batches) >= _MAX_LAYOUTS:
             same_length = remaining[:1]
@@ -81,7 +70,7 @@ def decode_batches(
         members = same_length
         if not matches.all():
             members, rows = same_length[matches], rows[matches]
-        batches.append(Batch(members, first, layout.columns(rows)))
+        batches.append(Batch(members, layout.like, layout.columns(rows)))
         if members.size == len(payloads):
             break
         remaining = (
@@ -90,114 +79,3 @@ def decode_batches(
             else remaining[~np.isin(remaining, members, assume_unique=True)]
         )
     return batches, undecodable
-
-
-@dataclass(frozen=True)
-class Leaf:
-    """A number, a time or a run of numbers: dotted path, type, byte in the body, how many."""
-
-    path: str
-    element: str
-    offset: int
-    count: int | None
-
-
-class Layout:
-    """Where the numbers are in a payload, and which bytes say that they are there.
-
-    `byte_order`: ``<`` or ``>``; `size`: of the payload.
-    """
-
-    def __init__(self, byte_order: ByteOrder, size: int):
-        self.byte_order = byte_order
-        # (size,) array, bytes of the encapsulation, of texts and of lengths; the others are numbers
-        # or padding
-        self.fixed = np.zeros(size, dtype=bool)
-        self.fixed[:ENCAPSULATION_SIZE] = True
-        self.leaves: list[Leaf] = []  # the numbers in the order of the wire
-
-    def columns(self, rows: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
-        """Return the numbers of payloads (m, size) by path."""
-        return {leaf.path: self._column(rows, leaf) for leaf in self.leaves}
-
-    def _column(self, rows: NDArray[np.uint8], leaf: Leaf) -> NDArray[Any]:
-        if leaf.element in SECONDS_NANOSECONDS:
-            seconds = self._numbers(rows, leaf.offset, "i", 4, 1)[:, 0].astype(np.int64)
-            nanoseconds = self._numbers(rows, leaf.offset + 4, "I", 4, 1)[:, 0]
-            return seconds * 1_000_000_000 + nanoseconds
-        primitive = PRIMITIVES[leaf.element]
-        numbers = self._numbers(
-            rows, leaf.offset, primitive.format, primitive.size, leaf.count or 1
-        )
-        return numbers[:, 0] if leaf.count is None else numbers
-
-    def write(self, rows: NDArray[np.uint8], leaf: Leaf, column: NDArray[Any]) -> None:
-        """Write numbers (m,) or (m, k), or times (m,) [ns], into payloads (m, size)."""
-        begin = ENCAPSULATION_SIZE + leaf.offset
-        if leaf.element in SECONDS_NANOSECONDS:
-            parts = [(column // 1_000_000_000, "i"), (column % 1_000_000_000, "I")]
-        else:
-            parts = [(column, PRIMITIVES[leaf.element].format)]
-        for numbers, code in parts:
-            kind = np.dtype(code).newbyteorder(self.byte_order)
-            columns = numbers if numbers.ndim == 2 else numbers[:, None]
-            raw = np.ascontiguousarray(columns, dtype=kind).view(np.uint8)
-            rows[:, begin : begin + raw.shape[1]] = raw
-            begin += raw.shape[1]
-
-    def _numbers(
-        self, rows: NDArray[np.uint8], offset: int, code: str, size: int, count: int
-    ) -> NDArray[Any]:
-        begin = ENCAPSULATION_SIZE + offset
-        stored = np.ascontiguousarray(rows[:, begin : begin + size * count])
-        numbers = stored.view(np.dtype(code).newbyteorder(self.byte_order))
-        return numbers.astype(numbers.dtype.newbyteorder("="), copy=False)
-
-
-def layout_of(message_type: type[Message], payload: bytes) -> Layout:
-    """Return the layout of a payload that `decode` accepts."""
-    layout = Layout(byte_order_of(message_type, payload), len(payload))
-    _add_message(layout, message_type.ros_type, payload[ENCAPSULATION_SIZE:], 0, "")
-    return layout
-
-
-def _add_message(layout: Layout, ros_type: str, body: bytes, offset: int, prefix: str) -> int:
-    for field in fields_of(ros_type):
-        path = prefix + field.attribute
-        if not field.is_sequence and not field.count:
-            offset = _add_element(layout, field.element, body, offset, path)
-            continue
-        count = field.count
-        if field.is_sequence:
-            count, offset = _add_length(layout, body, offset)
-        if field.element not in PRIMITIVES:
-            for position in range(count):
-                offset = _add_element(layout, field.element, body, offset, f"{path}.{position}")
-        elif count:
-            size = PRIMITIVES[field.element].size
-            offset += padding(offset, size)
-            layout.leaves.append(Leaf(path, field.element, offset, count))
-            offset += size * count
-    return offset
-
-
-def _add_element(layout: Layout, element: str, body: bytes, offset: int, path: str) -> int:
-    if element == "string":
-        length, offset = _add_length(layout, body, offset)
-        begin = ENCAPSULATION_SIZE + offset
-        layout.fixed[begin : begin + length] = True
-        return offset + length
-    if element in PRIMITIVES or element in SECONDS_NANOSECONDS:
-        align, size = (4, 8) if element in SECONDS_NANOSECONDS else (PRIMITIVES[element].size,) * 2
-        offset += padding(offset, align)
-        layout.leaves.append(Leaf(path, element, offset, None))
-        return offset + size
-    return _add_message(layout, element, body, offset, path + ".")
-
-
-def _add_length(layout: Layout, body: bytes, offset: int) -> tuple[int, int]:
-    offset += padding(offset, 4)
-    begin = ENCAPSULATION_SIZE + offset
-    layout.fixed[begin : begin + 4] = True
-    (length,) = struct.unpack_from(layout.byte_order + "I", body, offset)
-    return length, offset + 4

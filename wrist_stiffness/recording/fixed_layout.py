@@ -1,77 +1,74 @@
-"""Payloads of one message type that differ in their numbers only, one at a time.
+"""Payloads of one message type that differ in their numbers only.
 
-The messages of a stream keep their names, frame and lengths, so each number stays at its byte.  One
-compiled `struct` then reads or writes all of them, and one comparison tells whether the rest of a
-payload is as expected.  `batch` does the same for many payloads at once.
+The messages of a stream keep their names, frame and lengths, so each number stays at its byte.  For
+one payload, a compiled `struct` then reads or writes all numbers, and one comparison tells whether
+the rest is as expected; of many, NumPy reads or writes whole columns.
 """
 
 from __future__ import annotations
 
 import struct
 from collections import deque
+from functools import cached_property
 from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.recording.batch import layout_of
-from wrist_stiffness.recording.cdr import (
-    ENCAPSULATION_SIZE,
-    PRIMITIVES,
-    AnyMessage,
-    decode,
-    encode,
-)
-from wrist_stiffness.recording.messages import Message
-from wrist_stiffness.recording.schema import SECONDS_NANOSECONDS, fields_of
+from wrist_stiffness.recording.cdr import AnyMessage, Decoding, Leaf, encode, result_of
+from wrist_stiffness.recording.schema import PRIMITIVES, SECONDS_NANOSECONDS
+
+_SECOND_NS = 1_000_000_000
 
 
-class FixedLayout:
+class FixedLayout(Generic[AnyMessage]):
     """Where the numbers of a payload are, and all the bytes that are none.
 
     Numbers come in the order of the wire; a time is two of them, seconds and nanoseconds.
 
-    `payload`: a CDR payload that `cdr.decode` accepts, in either byte order.
+    `payload`: a CDR payload in either byte order.  Raises `RecordingError` if it cannot be decoded.
     """
 
-    def __init__(self, message_type: type[Message], payload: bytes) -> None:
-        self._layout = layout = layout_of(message_type, payload)
-        self._ros_type = message_type.ros_type
-        self._size = len(payload)
-        # As one long integer: no other comparison of bytes here and there is as quick.
-        self._mask = _integer(np.where(layout.fixed, 0xFF, 0).astype(np.uint8).tobytes())
-        self._fixed = _integer(payload) & self._mask
-        format_, end = str(layout.byte_order), 0
-        for leaf in layout.leaves:
-            begin = ENCAPSULATION_SIZE + leaf.offset
-            of_time = leaf.element in SECONDS_NANOSECONDS
-            code = _TIME if of_time else f"{leaf.count or 1}{PRIMITIVES[leaf.element].format}"
-            format_ += f"{begin - end}x{code}"
-            end = begin + struct.calcsize(layout.byte_order + code)
-        self._struct = struct.Struct(f"{format_}{self._size - end}x")
+    def __init__(self, message_type: type[AnyMessage], payload: bytes) -> None:
+        decoding = Decoding(message_type, payload)
+        self.like = result_of(decoding.message())  # the message in this payload
+        self.leaves = decoding.leaves
+        # (size,), bytes of the encapsulation, of texts and of lengths; the others are numbers or
+        # padding
+        self.fixed = np.zeros(len(payload), dtype=bool)
+        for part in decoding.fixed:
+            self.fixed[part] = True
+        self._byte_order = decoding.byte_order
+        self._payload = payload
 
     @classmethod
-    def of(cls, message: Message) -> FixedLayout:
+    def of(cls, message: AnyMessage) -> FixedLayout[AnyMessage]:
         """Return the little-endian layout of messages like this one."""
         return cls(type(message), encode(message))
 
-    def rows(self, *columns: NDArray[Any]) -> NDArray[np.uint8]:
-        """Return the payloads of n messages, (n, size), with zeros for padding.
+    @cached_property
+    def _mask(self) -> int:
+        # As one long integer: no other comparison of bytes here and there is as quick.
+        return _integer(np.where(self.fixed, 0xFF, 0).astype(np.uint8).tobytes())
 
-        `columns` (n,) or (n, k) arrays: one for each number, time [ns] and run of numbers, in the
-        order of the wire.
-        """
-        n = len(columns[0])
-        fixed = np.frombuffer(self._fixed.to_bytes(self._size, "little"), np.uint8)
-        out = np.broadcast_to(fixed, (n, self._size)).copy()
-        for leaf, column in zip(self._layout.leaves, columns, strict=True):
-            self._layout.write(out, leaf, column)
-        return out
+    @cached_property
+    def _fixed(self) -> int:
+        return _integer(self._payload) & self._mask
+
+    @cached_property
+    def _struct(self) -> struct.Struct:
+        format_, end = str(self._byte_order), 0
+        for leaf in self.leaves:
+            of_time = leaf.element in SECONDS_NANOSECONDS
+            code = "iI" if of_time else f"{leaf.length or 1}{PRIMITIVES[leaf.element].format}"
+            format_ += f"{leaf.begin - end}x{code}"
+            end = leaf.begin + struct.calcsize(self._byte_order + code)
+        return struct.Struct(f"{format_}{len(self._payload) - end}x")
 
     def matches(self, payload: bytes) -> bool:
         """Tell whether a payload differs from the first one in numbers and padding only."""
-        return len(payload) == self._size and _integer(payload) & self._mask == self._fixed
+        return len(payload) == len(self._payload) and _integer(payload) & self._mask == self._fixed
 
     def numbers(self, payload: bytes) -> tuple[float, ...]:
         """Return the numbers of a payload that matches."""
@@ -85,8 +82,57 @@ class FixedLayout:
         try:
             packed = self._struct.pack(*numbers)
         except struct.error as error:
-            raise RecordingError(f"{self._ros_type} cannot be encoded: {error}") from error
-        return (_integer(packed) | self._fixed).to_bytes(self._size, "little")
+            raise RecordingError(f"{self.like.ros_type} cannot be encoded: {error}") from error
+        return (_integer(packed) | self._fixed).to_bytes(len(self._payload), "little")
+
+    def columns(self, rows: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
+        """Return the numbers of payloads (m, size) that match, by path.
+
+        A scalar gives (m,), a sequence of k numbers (m, k), a time (m,) integer nanoseconds.
+        """
+        found = {}
+        for leaf in self.leaves:
+            if leaf.element in SECONDS_NANOSECONDS:
+                seconds = self._numbers(rows, leaf.begin, "i", 1).astype(np.int64)
+                nanoseconds = self._numbers(rows, leaf.begin + 4, "I", 1)
+                found[leaf.path] = (seconds * _SECOND_NS + nanoseconds)[:, 0]
+            else:
+                format_ = PRIMITIVES[leaf.element].format
+                numbers = self._numbers(rows, leaf.begin, format_, leaf.length or 1)
+                found[leaf.path] = numbers[:, 0] if leaf.length is None else numbers
+        return found
+
+    def _numbers(
+        self, rows: NDArray[np.uint8], begin: int, format_: str, count: int
+    ) -> NDArray[Any]:
+        kind = np.dtype(format_).newbyteorder(self._byte_order)
+        stored = np.ascontiguousarray(rows[:, begin : begin + kind.itemsize * count])
+        return stored.view(kind).astype(np.dtype(format_), copy=False)
+
+    def rows(self, *columns: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return the payloads of n messages, (n, size), with zeros for padding.
+
+        `columns` (n,) or (n, k) arrays: one for each number, time [ns] and run of numbers, in the
+        order of the wire.
+        """
+        fixed = np.frombuffer(self._fixed.to_bytes(len(self._payload), "little"), np.uint8)
+        out = np.tile(fixed, (len(columns[0]), 1))
+        for leaf, column in zip(self.leaves, columns, strict=True):
+            self.write(out, leaf, column)
+        return out
+
+    def write(self, rows: NDArray[np.uint8], leaf: Leaf, column: NDArray[Any]) -> None:
+        """Write numbers (m,) or (m, k), or times (m,) [ns], into payloads (m, size)."""
+        parts = [(column, PRIMITIVES[leaf.element].format)]
+        if leaf.element in SECONDS_NANOSECONDS:
+            parts = [(column // _SECOND_NS, "i"), (column % _SECOND_NS, "I")]
+        begin = leaf.begin
+        for numbers, format_ in parts:
+            kind = np.dtype(format_).newbyteorder(self._byte_order)
+            columns = numbers if numbers.ndim == 2 else numbers[:, None]
+            raw = np.ascontiguousarray(columns, dtype=kind).view(np.uint8)
+            rows[:, begin : begin + raw.shape[1]] = raw
+            begin += raw.shape[1]
 
 
 class FixedReader(Generic[AnyMessage]):
@@ -97,7 +143,7 @@ class FixedReader(Generic[AnyMessage]):
 
     def __init__(self, message_type: type[AnyMessage]) -> None:
         self._message_type = message_type
-        self._known: deque[tuple[FixedLayout, AnyMessage]] = deque(maxlen=self.LAYOUTS)
+        self._known: deque[FixedLayout[AnyMessage]] = deque(maxlen=self.LAYOUTS)
 
     def read(self, payload: bytes) -> tuple[AnyMessage, tuple[float, ...]]:
         """Take a payload apart.
@@ -106,17 +152,13 @@ class FixedReader(Generic[AnyMessage]):
         but maybe with other numbers, and `numbers`: of this payload (see `FixedLayout`).  Raises
         `RecordingError` if the payload cannot be decoded.
         """
-        for layout, like in self._known:
+        for layout in self._known:
             if layout.matches(payload):
-                return like, layout.numbers(payload)
-        like = decode(self._message_type, payload)
+                return layout.like, layout.numbers(payload)
         layout = FixedLayout(self._message_type, payload)
-        self._known.append((layout, like))
-        return like, layout.numbers(payload)
+        self._known.append(layout)
+        return layout.like, layout.numbers(payload)
 
 
 def _integer(payload: bytes) -> int:
     return int.from_bytes(payload, "little")
-
-
-_TIME = "".join(PRIMITIVES[item.element].format for item in fields_of(SECONDS_NANOSECONDS[0]))

@@ -9,78 +9,89 @@ nanoseconds (attribute ``stamp_ns`` for the field ``stamp``), and sequences are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import Field, dataclass, field
 from enum import IntEnum
+from typing import Any, ClassVar, dataclass_transform
 
-from wrist_stiffness.recording.message import Message, line
+MSG_LINE = "msg_line"
+MESSAGE_TYPES: dict[str, type[Message]] = {}
+"""Classes by full type name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Header(Message):
+def line(text: str, default: Any) -> Any:
+    """Declare one field of a message.
+
+    `text`: line of the ``.msg`` file: type, name and, where the file has one, the default value;
+    `default`: value in Python where none is given; immutable.
+    """
+    return field(default=default, metadata={MSG_LINE: text})
+
+
+@dataclass_transform(frozen_default=True)
+class Message:
+    """Base of all messages; `ros_type` is the full type name, ``package/msg/Type``."""
+
+    ros_type: ClassVar[str]
+    constants: ClassVar[tuple[str, ...]] = ()
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init_subclass__(cls, package: str) -> None:
+        """Make a frozen dataclass of the fields."""
+        cls.ros_type = f"{package}/msg/{cls.__name__}"
+        dataclass(frozen=True)(cls)
+        MESSAGE_TYPES[cls.ros_type] = cls
+
+
+class Header(Message, package="std_msgs"):
     """Stamp [ns since the epoch of the recording's clock] and coordinate frame."""
 
-    ros_type = "std_msgs/msg/Header"
     stamp_ns: int = line("builtin_interfaces/Time stamp", 0)
     frame_id: str = line("string frame_id", "")
 
 
-@dataclass(frozen=True, slots=True)
-class String(Message):
+class String(Message, package="std_msgs"):
     """A text."""
 
-    ros_type = "std_msgs/msg/String"
     data: str = line("string data", "")
 
 
-@dataclass(frozen=True, slots=True)
-class Bool(Message):
+class Bool(Message, package="std_msgs"):
     """A truth value."""
 
-    ros_type = "std_msgs/msg/Bool"
     data: bool = line("bool data", False)
 
 
-@dataclass(frozen=True, slots=True)
-class Float64(Message):
+class Float64(Message, package="std_msgs"):
     """A number; its unit belongs to the topic."""
 
-    ros_type = "std_msgs/msg/Float64"
     data: float = line("float64 data", 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class MultiArrayDimension(Message):
+class MultiArrayDimension(Message, package="std_msgs"):
     """One dimension of an array: label, length and stride [elements]."""
 
-    ros_type = "std_msgs/msg/MultiArrayDimension"
     label: str = line("string label", "")
     size: int = line("uint32 size", 0)
     stride: int = line("uint32 stride", 0)
 
 
-@dataclass(frozen=True, slots=True)
-class MultiArrayLayout(Message):
+class MultiArrayLayout(Message, package="std_msgs"):
     """Dimensions of an array, outermost first, and the offset of its first element."""
 
-    ros_type = "std_msgs/msg/MultiArrayLayout"
     dim: tuple[MultiArrayDimension, ...] = line("MultiArrayDimension[] dim", ())
     data_offset: int = line("uint32 data_offset", 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Float64MultiArray(Message):
+class Float64MultiArray(Message, package="std_msgs"):
     """Numbers with a layout."""
 
-    ros_type = "std_msgs/msg/Float64MultiArray"
     layout: MultiArrayLayout = line("MultiArrayLayout layout", MultiArrayLayout())
     data: tuple[float, ...] = line("float64[] data", ())
 
 
-@dataclass(frozen=True, slots=True)
-class JointState(Message):
+class JointState(Message, package="sensor_msgs"):
     """Positions [rad], velocities [rad/s] and efforts [N m] by joint name; may be empty."""
 
-    ros_type = "sensor_msgs/msg/JointState"
     header: Header = line("std_msgs/Header header", Header())
     name: tuple[str, ...] = line("string[] name", ())
     position: tuple[float, ...] = line("float64[] position", ())
@@ -88,153 +99,121 @@ class JointState(Message):
     effort: tuple[float, ...] = line("float64[] effort", ())
 
 
-@dataclass(frozen=True, slots=True)
-class Temperature(Message):
+class Temperature(Message, package="sensor_msgs"):
     """Temperature [°C] with its variance [K²], 0 = unknown."""
 
-    ros_type = "sensor_msgs/msg/Temperature"
     header: Header = line("std_msgs/Header header", Header())
     temperature: float = line("float64 temperature", 0.0)
     variance: float = line("float64 variance", 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Vector3(Message):
+class Vector3(Message, package="geometry_msgs"):
     """A free vector."""
 
-    ros_type = "geometry_msgs/msg/Vector3"
     x: float = line("float64 x", 0.0)
     y: float = line("float64 y", 0.0)
     z: float = line("float64 z", 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Vector3Stamped(Message):
+class Vector3Stamped(Message, package="geometry_msgs"):
     """A free vector in a frame; its unit belongs to the topic."""
 
-    ros_type = "geometry_msgs/msg/Vector3Stamped"
     header: Header = line("std_msgs/Header header", Header())
     vector: Vector3 = line("Vector3 vector", Vector3())
 
 
-@dataclass(frozen=True, slots=True)
-class Point(Message):
+class Point(Message, package="geometry_msgs"):
     """A position [m]."""
 
-    ros_type = "geometry_msgs/msg/Point"
     x: float = line("float64 x", 0.0)
     y: float = line("float64 y", 0.0)
     z: float = line("float64 z", 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Quaternion(Message):
+class Quaternion(Message, package="geometry_msgs"):
     """A unit quaternion, scalar last."""
 
-    ros_type = "geometry_msgs/msg/Quaternion"
     x: float = line("float64 x 0", 0.0)
     y: float = line("float64 y 0", 0.0)
     z: float = line("float64 z 0", 0.0)
     w: float = line("float64 w 1", 1.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Pose(Message):
+class Pose(Message, package="geometry_msgs"):
     """Position [m] and orientation."""
 
-    ros_type = "geometry_msgs/msg/Pose"
     position: Point = line("Point position", Point())
     orientation: Quaternion = line("Quaternion orientation", Quaternion())
 
 
-@dataclass(frozen=True, slots=True)
-class PoseWithCovariance(Message):
+class PoseWithCovariance(Message, package="geometry_msgs"):
     """A pose and the row-major 6×6 covariance [m, rad], translation first, fixed axes."""
 
-    ros_type = "geometry_msgs/msg/PoseWithCovariance"
     pose: Pose = line("Pose pose", Pose())
     covariance: tuple[float, ...] = line("float64[36] covariance", (0.0,) * 36)
 
 
-@dataclass(frozen=True, slots=True)
-class Wrench(Message):
+class Wrench(Message, package="geometry_msgs"):
     """Force [N] and moment [N m]."""
 
-    ros_type = "geometry_msgs/msg/Wrench"
     force: Vector3 = line("Vector3 force", Vector3())
     torque: Vector3 = line("Vector3 torque", Vector3())
 
 
-@dataclass(frozen=True, slots=True)
-class WrenchStamped(Message):
+class WrenchStamped(Message, package="geometry_msgs"):
     """A wrench with stamp and frame."""
 
-    ros_type = "geometry_msgs/msg/WrenchStamped"
     header: Header = line("std_msgs/Header header", Header())
     wrench: Wrench = line("Wrench wrench", Wrench())
 
 
-@dataclass(frozen=True, slots=True)
-class PoseStamped(Message):
+class PoseStamped(Message, package="geometry_msgs"):
     """A pose with stamp and frame."""
 
-    ros_type = "geometry_msgs/msg/PoseStamped"
     header: Header = line("std_msgs/Header header", Header())
     pose: Pose = line("Pose pose", Pose())
 
 
-@dataclass(frozen=True, slots=True)
-class PoseWithCovarianceStamped(Message):
+class PoseWithCovarianceStamped(Message, package="geometry_msgs"):
     """A pose with covariance, stamp and frame."""
 
-    ros_type = "geometry_msgs/msg/PoseWithCovarianceStamped"
     header: Header = line("std_msgs/Header header", Header())
     pose: PoseWithCovariance = line("PoseWithCovariance pose", PoseWithCovariance())
 
 
-@dataclass(frozen=True, slots=True)
-class PoseArray(Message):
+class PoseArray(Message, package="geometry_msgs"):
     """Several poses of one stamp and frame."""
 
-    ros_type = "geometry_msgs/msg/PoseArray"
     header: Header = line("std_msgs/Header header", Header())
     poses: tuple[Pose, ...] = line("Pose[] poses", ())
 
 
-@dataclass(frozen=True, slots=True)
-class Transform(Message):
+class Transform(Message, package="geometry_msgs"):
     """Translation [m] and rotation from a child frame to its parent."""
 
-    ros_type = "geometry_msgs/msg/Transform"
     translation: Vector3 = line("Vector3 translation", Vector3())
     rotation: Quaternion = line("Quaternion rotation", Quaternion())
 
 
-@dataclass(frozen=True, slots=True)
-class TransformStamped(Message):
+class TransformStamped(Message, package="geometry_msgs"):
     """Where a child frame stands in the header's frame."""
 
-    ros_type = "geometry_msgs/msg/TransformStamped"
     header: Header = line("std_msgs/Header header", Header())
     child_frame_id: str = line("string child_frame_id", "")
     transform: Transform = line("Transform transform", Transform())
 
 
-@dataclass(frozen=True, slots=True)
-class TFMessage(Message):
+class TFMessage(Message, package="tf2_msgs"):
     """Any number of transforms."""
 
-    ros_type = "tf2_msgs/msg/TFMessage"
     transforms: tuple[TransformStamped, ...] = line(
         "geometry_msgs/TransformStamped[] transforms", ()
     )
 
 
-@dataclass(frozen=True, slots=True)
-class JointTrajectoryPoint(Message):
+class JointTrajectoryPoint(Message, package="trajectory_msgs"):
     """State of the joints [rad, rad/s, rad/s², N m] at a time after the start [ns]."""
 
-    ros_type = "trajectory_msgs/msg/JointTrajectoryPoint"
     positions: tuple[float, ...] = line("float64[] positions", ())
     velocities: tuple[float, ...] = line("float64[] velocities", ())
     accelerations: tuple[float, ...] = line("float64[] accelerations", ())
@@ -242,21 +221,17 @@ class JointTrajectoryPoint(Message):
     time_from_start_ns: int = line("builtin_interfaces/Duration time_from_start", 0)
 
 
-@dataclass(frozen=True, slots=True)
-class JointTrajectory(Message):
+class JointTrajectory(Message, package="trajectory_msgs"):
     """Points of a motion, in the order of `joint_names`."""
 
-    ros_type = "trajectory_msgs/msg/JointTrajectory"
     header: Header = line("std_msgs/Header header", Header())
     joint_names: tuple[str, ...] = line("string[] joint_names", ())
     points: tuple[JointTrajectoryPoint, ...] = line("JointTrajectoryPoint[] points", ())
 
 
-@dataclass(frozen=True, slots=True)
-class KeyValue(Message):
+class KeyValue(Message, package="diagnostic_msgs"):
     """One named value of a diagnostic."""
 
-    ros_type = "diagnostic_msgs/msg/KeyValue"
     key: str = line("string key", "")
     value: str = line("string value", "")
 
@@ -270,11 +245,9 @@ class DiagnosticLevel(IntEnum):
     STALE = 3
 
 
-@dataclass(frozen=True, slots=True)
-class DiagnosticStatus(Message):
+class DiagnosticStatus(Message, package="diagnostic_msgs"):
     """State of one component, `level` as in `DiagnosticLevel`."""
 
-    ros_type = "diagnostic_msgs/msg/DiagnosticStatus"
     constants = tuple(f"byte {level.name}={level.value}" for level in DiagnosticLevel)
     level: int = line("byte level", 0)
     name: str = line("string name", "")
@@ -283,50 +256,40 @@ class DiagnosticStatus(Message):
     values: tuple[KeyValue, ...] = line("KeyValue[] values", ())
 
 
-@dataclass(frozen=True, slots=True)
-class DiagnosticArray(Message):
+class DiagnosticArray(Message, package="diagnostic_msgs"):
     """States of several components at one stamp."""
 
-    ros_type = "diagnostic_msgs/msg/DiagnosticArray"
     header: Header = line("std_msgs/Header header", Header())
     status: tuple[DiagnosticStatus, ...] = line("DiagnosticStatus[] status", ())
 
 
-@dataclass(frozen=True, slots=True)
-class ColorRGBA(Message):
+class ColorRGBA(Message, package="std_msgs"):
     """A colour, 0 to 1."""
 
-    ros_type = "std_msgs/msg/ColorRGBA"
     r: float = line("float32 r", 0.0)
     g: float = line("float32 g", 0.0)
     b: float = line("float32 b", 0.0)
     a: float = line("float32 a", 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class CompressedImage(Message):
+class CompressedImage(Message, package="sensor_msgs"):
     """A picture; none in a marker here."""
 
-    ros_type = "sensor_msgs/msg/CompressedImage"
     header: Header = line("std_msgs/Header header", Header())
     format: str = line("string format", "")
     data: tuple[int, ...] = line("uint8[] data", ())
 
 
-@dataclass(frozen=True, slots=True)
-class UVCoordinate(Message):
+class UVCoordinate(Message, package="visualization_msgs"):
     """Where a point is in a marker's picture."""
 
-    ros_type = "visualization_msgs/msg/UVCoordinate"
     u: float = line("float32 u", 0.0)
     v: float = line("float32 v", 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class MeshFile(Message):
+class MeshFile(Message, package="visualization_msgs"):
     """A mesh; none in a marker here."""
 
-    ros_type = "visualization_msgs/msg/MeshFile"
     filename: str = line("string filename", "")
     data: tuple[int, ...] = line("uint8[] data", ())
 
@@ -347,11 +310,9 @@ class MarkerShape(IntEnum):
     TEXT_VIEW_FACING = 9
 
 
-@dataclass(frozen=True, slots=True)
-class Marker(Message):
+class Marker(Message, package="visualization_msgs"):
     """Something to be drawn, `type` as in `MarkerShape`; sizes [m]."""
 
-    ros_type = "visualization_msgs/msg/Marker"
     constants = tuple(f"int32 {each}" for each in _OF_MARKERS.split())
     header: Header = line("std_msgs/Header header", Header())
     ns: str = line("string ns", "")
@@ -374,16 +335,7 @@ class Marker(Message):
     mesh_use_embedded_materials: bool = line("bool mesh_use_embedded_materials", False)
 
 
-@dataclass(frozen=True, slots=True)
-class MarkerArray(Message):
+class MarkerArray(Message, package="visualization_msgs"):
     """Things to be drawn at once."""
 
-    ros_type = "visualization_msgs/msg/MarkerArray"
     markers: tuple[Marker, ...] = line("Marker[] markers", ())
-
-
-MESSAGE_TYPES: dict[str, type[Message]] = {
-    each.ros_type: each
-    for each in tuple(globals().values())
-    if isinstance(each, type) and issubclass(each, Message) and each is not Message
-}

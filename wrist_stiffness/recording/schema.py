@@ -8,29 +8,35 @@ import json
 import re
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
-from wrist_stiffness.recording.message import MSG_LINE
-from wrist_stiffness.recording.messages import MESSAGE_TYPES
+from wrist_stiffness.recording.messages import MESSAGE_TYPES, MSG_LINE
 
 SECONDS_NANOSECONDS = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 """Types that the dataclasses hold as one integer of nanoseconds."""
 
-# Numbers of rosidl's type description (type_description_interfaces/msg/FieldType): element
-# types, and what is added for a fixed-size array and an unbounded sequence.
-_NESTED_ID = 1
-_ELEMENT_IDS = {
-    "uint8": 3,
-    "int32": 6,
-    "uint32": 7,
-    "float32": 10,
-    "float64": 11,
-    "bool": 15,
-    "byte": 16,
-    "string": 17,
+
+class Primitive(NamedTuple):
+    """A type of numbers: as `struct` and NumPy write it, bytes, and as rosidl numbers it."""
+
+    format: str
+    size: int
+    type_id: int
+
+
+# Numbers of rosidl's type description (type_description_interfaces/msg/FieldType), and what is
+# added to them for a fixed-size array and an unbounded sequence.
+PRIMITIVES = {
+    "uint8": Primitive("B", 1, 3),
+    "int32": Primitive("i", 4, 6),
+    "uint32": Primitive("I", 4, 7),
+    "float32": Primitive("f", 4, 10),
+    "float64": Primitive("d", 8, 11),
+    "bool": Primitive("?", 1, 15),
+    "byte": Primitive("B", 1, 16),
 }
-_ARRAY_ID = 48
-_SEQUENCE_ID = 144
+_NESTED_ID, _STRING_ID = 1, 17
+_ARRAY_ID, _SEQUENCE_ID = 48, 144
 
 _LINE = re.compile(r"(?P<element>[\w/]+)(?P<bracket>\[(?P<count>\d*)\])? (?P<name>\w+)")
 
@@ -41,9 +47,9 @@ class Field:
 
     name: str  # name in ROS
     attribute: str  # name of the dataclass attribute
-    element: str  # primitive type, or ``package/msg/Type``
-    is_sequence: bool = False  # whether the field is an unbounded sequence
-    count: int = 0  # number of elements of a fixed-size array, 0 for anything else
+    element: str  # one of `PRIMITIVES`, ``string``, or ``package/msg/Type``
+    is_sequence: bool  # whether the field is an unbounded sequence
+    count: int  # number of elements of a fixed-size array, 0 for anything else
 
 
 @cache
@@ -52,39 +58,24 @@ def fields_of(ros_type: str) -> tuple[Field, ...]:
 
     `ros_type`: full name of a type in `wrist_stiffness.recording.messages`.
     """
-    if ros_type in SECONDS_NANOSECONDS:
-        return (Field("sec", "sec", "int32"), Field("nanosec", "nanosec", "uint32"))
-    package = ros_type.split("/")[0]
-    parsed = []
-    for item in dataclasses.fields(MESSAGE_TYPES[ros_type]):  # type: ignore[arg-type]
-        match = _LINE.match(item.metadata[MSG_LINE])
-        if match is None:
-            raise ValueError(f"{ros_type}: {item.metadata[MSG_LINE]!r} is no .msg line")
-        parsed.append(
-            Field(
-                name=match["name"],
-                attribute=item.name,
-                element=_full_name(match["element"], package),
-                is_sequence=match["bracket"] == "[]",
-                count=int(match["count"] or 0),
-            )
-        )
-    return tuple(parsed)
+    return tuple(_field(line, ros_type.split("/")[0]) for line in _field_lines(ros_type))
 
 
-def _full_name(element: str, package: str) -> str:
-    if element in _ELEMENT_IDS:
-        return element
-    *given, name = element.split("/")
-    return f"{given[0] if given else package}/msg/{name}"
+def _field(line: str, package: str) -> Field:
+    match = _LINE.match(line)
+    assert match is not None  # the lines are those of `messages`
+    name, element = match["name"], match["element"]
+    if element not in PRIMITIVES and element != "string":
+        *given, type_name = element.split("/")
+        element = f"{given[0] if given else package}/msg/{type_name}"
+    attribute = f"{name}_ns" if element in SECONDS_NANOSECONDS else name
+    return Field(name, attribute, element, match["bracket"] == "[]", int(match["count"] or 0))
 
 
-def _lines_of(ros_type: str) -> list[str]:
+def _field_lines(ros_type: str) -> list[str]:
     if ros_type in SECONDS_NANOSECONDS:
         return ["int32 sec", "uint32 nanosec"]
-    message_type = MESSAGE_TYPES[ros_type]
-    lines = [item.metadata[MSG_LINE] for item in dataclasses.fields(message_type)]  # type: ignore[arg-type]
-    return [*message_type.constants, *lines]
+    return [item.metadata[MSG_LINE] for item in dataclasses.fields(MESSAGE_TYPES[ros_type])]
 
 
 def _nested_types(ros_type: str) -> list[str]:
@@ -93,7 +84,7 @@ def _nested_types(ros_type: str) -> list[str]:
     waiting = [ros_type]
     while waiting:
         for item in fields_of(waiting.pop(0)):
-            if item.element not in _ELEMENT_IDS and item.element not in found:
+            if "/" in item.element and item.element not in found:
                 found.append(item.element)
                 waiting.append(item.element)
     return found
@@ -106,18 +97,23 @@ def definition_text(ros_type: str) -> str:
     `ros_type`: full name of a type in `wrist_stiffness.recording.messages`.  Gives text as rosbag2
     writes it into a recording, comments left out.
     """
-    parts = ["\n".join(_lines_of(ros_type)) + "\n"]
-    for name in _nested_types(ros_type):
-        heading = f"{'=' * 80}\nMSG: {name.replace('/msg/', '/')}\n"
-        parts.append(heading + "\n".join(_lines_of(name)) + "\n")
-    return "".join(parts)
+    text = ""
+    for name in (ros_type, *_nested_types(ros_type)):
+        if text:
+            text += f"{'=' * 80}\nMSG: {name.replace('/msg/', '/')}\n"
+        constants = MESSAGE_TYPES[name].constants if name in MESSAGE_TYPES else ()
+        text += "\n".join((*constants, *_field_lines(name))) + "\n"
+    return text
 
 
 def _description(ros_type: str) -> dict[str, Any]:
     described = []
     for item in fields_of(ros_type):
-        nested = item.element not in _ELEMENT_IDS
-        type_id = _NESTED_ID if nested else _ELEMENT_IDS[item.element]
+        nested = item.element if "/" in item.element else ""
+        if item.element in PRIMITIVES:
+            type_id = PRIMITIVES[item.element].type_id
+        else:
+            type_id = _NESTED_ID if nested else _STRING_ID
         if item.is_sequence:
             type_id += _SEQUENCE_ID
         elif item.count:
@@ -129,7 +125,7 @@ def _description(ros_type: str) -> dict[str, Any]:
                     "type_id": type_id,
                     "capacity": item.count,
                     "string_capacity": 0,
-                    "nested_type_name": item.element if nested else "",
+                    "nested_type_name": nested,
                 },
             }
         )
