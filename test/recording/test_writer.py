@@ -18,6 +18,7 @@ from undamaged import undamaged
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording import RecordingWriter, open_recording
 from wrist_stiffness.recording.cdr import encode
+from wrist_stiffness.recording.chunk_writer import CHUNK_BYTES
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
@@ -26,7 +27,6 @@ from wrist_stiffness.recording.messages import (
     PoseStamped,
     String,
 )
-from wrist_stiffness.recording.writer import CHUNK_BYTES
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 FORMS = pytest.mark.parametrize("name", ["bag", "file.mcap"], ids=["folder", "bare"])
@@ -177,7 +177,7 @@ def test_a_signal_before_the_first_message_leaves_nothing_behind(tmp_path, monke
         assert list(tmp_path.iterdir()) != []
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("wrist_stiffness.recording.writer.ChunkWriter.start", interrupted)
+    monkeypatch.setattr("wrist_stiffness.recording.writer.ChunkWriter.__init__", interrupted)
     with pytest.raises(KeyboardInterrupt), RecordingWriter(tmp_path / name):
         raise AssertionError("never begun")
     assert list(tmp_path.iterdir()) == []

@@ -40,8 +40,7 @@ LARGEST_CHUNK = 64 << 20
 """Recorders write a chunk of about 1 MiB, or of one larger message: a raw picture of 4K has 25 MB.
 More is damage, or meant to take all memory: not a reason to give it."""
 
-Places = NDArray[np.int64]
-Times = NDArray[np.int64]
+Integers = NDArray[np.int64]
 Payloads = Sequence[bytes] | NDArray[np.uint8]
 """Payloads one by one, or (m, size) where all have one size."""
 
@@ -94,7 +93,7 @@ class Contents:
     """A chunk, unpacked and checked."""
 
     buffer: bytes  # its records
-    begins: Places  # (m,) array, where its messages begin
+    begins: Integers  # (m,) array, where its messages begin
     heads: NDArray[np.void]  # (m,) of `MESSAGE`, how they begin
     others: list[tuple[int, bytes]]  # opcode and content of its other records
 
@@ -183,7 +182,7 @@ def _walked(buffer: bytes, chunk: Chunk) -> Contents:
     return Contents(buffer, places, heads, [(kind, buffer[a:b]) for kind, a, b in others])
 
 
-def _walk(buffer: bytes) -> tuple[Places, list[tuple[int, int, int]], int]:
+def _walk(buffer: bytes) -> tuple[Integers, list[tuple[int, int, int]], int]:
     """Return where messages begin, opcode and content of other records, where there is none."""
     begins, others = [], []
     position, total, unpack = 0, len(buffer), RECORD_HEAD.unpack_from
@@ -200,7 +199,7 @@ def _walk(buffer: bytes) -> tuple[Places, list[tuple[int, int, int]], int]:
     return np.array(begins, dtype=np.int64), others, position
 
 
-def _compiled_walk(buffer: bytes) -> tuple[Places, list[tuple[int, int, int]], int]:
+def _compiled_walk(buffer: bytes) -> tuple[Integers, list[tuple[int, int, int]], int]:
     places = np.empty(len(buffer) // RECORD_HEAD.size + 1, dtype=np.int64)
     count, others, position = records.walk(buffer, places)
     return places[:count].copy(), others, position

@@ -11,18 +11,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.recording.channel import Channel
 from wrist_stiffness.recording.mcap_chunk import (
     MESSAGE,
     MESSAGE_HEAD_SIZE,
     Contents,
+    Integers,
     Payloads,
     from_each_byte,
 )
-
-Integers = NDArray[np.int64]
 
 
 class RawMessage(NamedTuple):

@@ -19,14 +19,14 @@ from wrist_stiffness.recording.mcap_chunk import (
     LAST_TIME_NS,
     Chunk,
     Contents,
+    Integers,
     Payloads,
     Span,
-    Times,
     contents_of,
 )
 from wrist_stiffness.recording.mcap_index import McapIndex, index_mcap
 from wrist_stiffness.recording.messages import Message
-from wrist_stiffness.recording.raw_block import Integers, RawBlock, RawMessage
+from wrist_stiffness.recording.raw_block import RawBlock, RawMessage
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ class Recording:
                 )
         yield from _earlier(opened, LAST_TIME_NS, len(chunks))
 
-    def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Times, Payloads]]:
+    def payloads(self, topics: Collection[str]) -> Iterator[tuple[str, Integers, Payloads]]:
         """Iterate over topic, log times [ns] and payloads, many of one topic at a time."""
         for block in self.blocks(topics, PAYLOADS_AT_A_TIME):
             for topic, rows in block.topics().items():

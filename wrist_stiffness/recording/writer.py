@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from errno import EEXIST
 from functools import cache
 from os import PathLike
@@ -24,9 +25,6 @@ from wrist_stiffness.recording.messages import Message
 from wrist_stiffness.recording.reader import open_recording
 
 METADATA_VERSION = 9
-CHUNK_BYTES = 128 * 1024
-"""Of messages before compression.  A cut file keeps its whole chunks: MCAP's usual 1 MiB is minutes
-of a slow sensor, and the file is 1 % smaller for it."""
 _UNLIMITED = {"sec": 9223372036, "nsec": 854775807}
 # rclpy's default profile; "unlimited" is the largest duration that rmw knows.
 _QOS_PROFILE = {
@@ -85,8 +83,7 @@ class RecordingWriter:
             if self._is_folder:
                 self._partial.mkdir()
             self._stream = self._storage_path.open("xb")
-            self._mcap = ChunkWriter(self._stream, CHUNK_BYTES)
-            self._mcap.start("ros2", "wrist_stiffness")
+            self._mcap = ChunkWriter(self._stream)
         except BaseException as error:
             # A signal may end the program here, before the `with` block has begun.
             self.__exit__(type(error), error, error.__traceback__)
@@ -136,44 +133,54 @@ class RecordingWriter:
         topic has another type, the time is out of range or the disk refuses, or has refused a
         message before.
         """
-        self._check_open()
         if not 0 <= log_time_ns <= LAST_TIME_NS:
             raise RecordingError(
                 f"{channel.topic}: log time {log_time_ns} ns is outside 0 … {LAST_TIME_NS}"
             )
-        try:
-            channel_id = self._register(channel)
-            self._mcap.add_message(channel_id, log_time_ns, payload)
-        except OSError as error:
-            self._refused = error
-            raise self._refusal(error) from error
+        with self._writing():
+            self._mcap.add_message(self.channel_id(channel), log_time_ns, payload)
 
     def channel_id(self, channel: Channel) -> int:
         """Return the number of a channel, for `write_block`; it is made known where it is new.
 
         Raises `RecordingError` if its topic has another type.
         """
-        self._check_open()
-        return self._register(channel)
+        known, number = self._channels.get(channel.topic, (channel, 0))
+        if known is not channel and known.ros_type != channel.ros_type:
+            raise RecordingError(
+                f"{channel.topic} carries {known.ros_type}, not {channel.ros_type}"
+            )
+        if not number:
+            if not channel.topic.startswith("/"):
+                raise RecordingError(f"topic {channel.topic!r} does not begin with '/'")
+            metadata = {
+                "offered_qos_profiles": _offered(),
+                "topic_type_hash": channel.type_hash,
+            }
+            number = self._mcap.register(channel, metadata)
+            self._channels[channel.topic] = (channel, number)
+        return number
 
     def write_block(self, messages: Messages) -> None:
         """Append many messages, with log times as `write_raw` takes them.
 
         Raises `RecordingError` if the disk refuses, or has refused a message before.
         """
-        self._check_open()
-        try:
+        with self._writing():
             self._mcap.add_messages(messages)
-        except OSError as error:
-            self._refused = error
-            raise self._refusal(error) from error
 
-    def _check_open(self) -> None:
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
         if self._stream is None:
             raise RecordingError(f"{self.path}: written to outside of its `with` block")
         if self._refused is not None:
             # Nothing behind a torn chunk can be read.
             raise self._refusal(self._refused) from self._refused
+        try:
+            yield
+        except OSError as error:
+            self._refused = error
+            raise self._refusal(error) from error
 
     def __exit__(
         self,
@@ -232,29 +239,6 @@ class RecordingWriter:
     @property
     def _storage_path(self) -> Path:
         return self._partial / f"{self.path.name}_0.mcap" if self._is_folder else self._partial
-
-    def _register(self, channel: Channel) -> int:
-        known = self._channels.get(channel.topic)
-        if known is None:
-            if not channel.topic.startswith("/"):
-                raise RecordingError(f"topic {channel.topic!r} does not begin with '/'")
-            schema_id = self._mcap.register_schema(
-                channel.ros_type, channel.schema_encoding, channel.schema_text
-            )
-            metadata = {
-                "offered_qos_profiles": _offered(),
-                "topic_type_hash": channel.type_hash,
-            }
-            channel_id = self._mcap.register_channel(
-                channel.topic, channel.message_encoding, schema_id, metadata
-            )
-            self._channels[channel.topic] = (channel, channel_id)
-            return channel_id
-        if known[0] is not channel and known[0].ros_type != channel.ros_type:
-            raise RecordingError(
-                f"{channel.topic} carries {known[0].ros_type}, not {channel.ros_type}"
-            )
-        return known[1]
 
     def _finish(self) -> None:
         assert self._stream is not None  # only called inside the `with` block
