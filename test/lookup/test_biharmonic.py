@@ -161,11 +161,10 @@ ONES = np.ones((9, 1))
 @pytest.mark.parametrize(
     ("nodes", "values", "message"),
     [
-        (np.vstack([square_grid(3)[:8], square_grid(3)[2] + 1e-6]), ONES, "nodes 2 and 8 are both"),
         (square_grid(3)[:2], ONES[:2], "2 given; at least 3"),
         (np.zeros((0, 2)), np.zeros((0, 1)), "0 given; at least 3"),
-        (square_grid(3) * [0.0, 1.0], ONES, r"all have angle 1 = -?0\.0 rad; they lie on a line"),
-        (np.linspace(0, 1, 9)[:, None] * [1.0, 2.0] + 3.0, ONES, "line: ratio"),
+        (square_grid(3) * [0.0, 1.0], ONES, "all 9 lie on a line"),
+        (np.linspace(0, 1, 9)[:, None] * [1.0, 2.0] + 3.0, ONES, "all 9 lie on a line"),
     ],
 )
 def test_unusable_nodes_are_refused(nodes, values, message):

@@ -39,7 +39,7 @@ from wrist_stiffness.mechanism.components import (
     ElasticComponents,
 )
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.contact import settle
+from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 
@@ -285,12 +285,12 @@ class _Spring:
         """Return the forces of the patches for a motion of all frames, and which touch."""
         apart = self.gap + self.wrench.T @ (self.across @ moved)
         if not self.pulls.any():
-            return settle(self.flexibility, apart, guess)
+            return solve_contact(self.flexibility, apart, guess)
         pulls, pushes = self.pulls, ~self.pulls
         own, cross = self.flexibility[np.ix_(pulls, pulls)], self.flexibility[np.ix_(pulls, pushes)]
         by_pulling = np.linalg.solve(own, np.column_stack([cross, apart[pulls]]))
         force, held = np.zeros(len(apart)), pulls.copy()
-        force[pushes], held[pushes] = settle(
+        force[pushes], held[pushes] = solve_contact(
             self.flexibility[np.ix_(pushes, pushes)] - cross.T @ by_pulling[:, :-1],
             apart[pushes] - cross.T @ by_pulling[:, -1],
             None if guess is None else guess[pushes],

@@ -16,18 +16,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import inv, solve
-from scipy.spatial import KDTree
 
 from wrist_stiffness.errors import InputError
 
 KERNEL, TREND = "thin_plate", "plane"
 """What a table calls r^2 ln r, and the polynomial that is added."""
 
-MIN_NODE_DISTANCE = 1e-6
-"""Nodes nearer than this, in the unit box, count as one: the condition number of the system grows
-as distance^-2, to 1e12 at this limit, and no motor resolves a microradian."""
 MIN_NODE_SPREAD = 1e-6
-"""Nodes whose ratio of singular values is below this, in the unit box, lie on a line."""
+"""Nodes whose ratio of singular values is below this lie on a line."""
 QUERIES_PER_BLOCK = 1024
 """Bounds the memory of long queries."""
 
@@ -56,8 +52,8 @@ class BiharmonicSpline:
         """Spline through values at nodes.
 
         `nodes` (n, 2): joint angles [rad], at least three nodes that are not on a line, in any
-        order; `values` (n, m): m value columns, any units.  Raises `InputError`: too few or
-        duplicate nodes, nodes on a line.
+        order; `values` (n, m): m value columns, any units.  Raises `InputError`: too few
+        nodes, nodes on a line.
         """
         nodes = np.array(nodes, dtype=float)
         values = np.array(values, dtype=float)
@@ -65,7 +61,9 @@ class BiharmonicSpline:
             raise InputError(f"spline nodes: {len(nodes)} given; at least 3 needed")
         offset = nodes.min(axis=0)
         scale = np.ptp(nodes, axis=0)
-        _require_spread_nodes(nodes, offset, scale)
+        sigma = np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)
+        if sigma[1] < MIN_NODE_SPREAD * sigma[0]:
+            raise InputError(f"spline nodes: all {len(nodes)} lie on a line")
         right = np.vstack([values, np.zeros((3, values.shape[1]))])
         matrix = _system_matrix((nodes - offset) / scale)
         # LAPACK's symmetric solver takes one right side after the other and is far slower.
@@ -135,31 +133,3 @@ def _system_matrix(scaled: NDArray[np.float64]) -> NDArray[np.float64]:
     matrix[:count, count:] = plane
     matrix[count:, :count] = plane.T
     return matrix
-
-
-def _require_spread_nodes(
-    nodes: NDArray[np.float64], offset: NDArray[np.float64], scale: NDArray[np.float64]
-) -> None:
-    """Reject nodes on a line, and two nodes in one place."""
-    if (scale == 0.0).any():
-        axis = int(np.argmin(scale))
-        raise InputError(
-            f"spline nodes: all have angle {axis + 1} = {offset[axis]} rad; they lie on a line"
-        )
-    scaled = (nodes - offset) / scale
-    distance, neighbour = KDTree(scaled).query(scaled, k=2)
-    nearest = int(np.argmin(distance[:, 1]))
-    if distance[nearest, 1] < MIN_NODE_DISTANCE:
-        # Of equal nodes the tree may return the node itself second.
-        other = next(int(i) for i in neighbour[nearest] if i != nearest)
-        first, second = sorted((nearest, other))
-        raise InputError(
-            f"spline nodes: nodes {first} and {second} are both at {nodes[nearest]} rad, nearer "
-            f"than {MIN_NODE_DISTANCE} of the box"
-        )
-    sigma = np.linalg.svd(scaled - scaled.mean(axis=0), compute_uv=False)
-    if sigma[1] < MIN_NODE_SPREAD * sigma[0]:
-        raise InputError(
-            f"spline nodes: they lie on a line: ratio of singular values "
-            f"{sigma[1] / sigma[0]:.3g}, limit {MIN_NODE_SPREAD}"
-        )

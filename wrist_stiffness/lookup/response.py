@@ -29,28 +29,22 @@ class Response:
     active: NDArray[np.bool_]  # (..., m), sectors in contact
 
 
-def respond(
-    operators: ContactOperators,
-    wrench: Array,
-    active: NDArray[np.bool_] | None = None,
-) -> Response:
+def respond(operators: ContactOperators, wrench: Array) -> Response:
     """Solve for the platform's twist under a load, with contact.
 
-    `operators`: of shape (...); `wrench` (..., 6): load on the platform at O in F [N, N m];
-    `active` (m,): first guess of the sectors in contact, for a single pose.  Gives `Response`:
-    twist, contact forces and active sectors of shape (...).
+    `operators`: of shape (...); `wrench` (..., 6): load on the platform at O in F [N, N m].  Gives
+    `Response`: twist, contact forces and active sectors of shape (...).
     """
     free = operators.weight_twist + np.einsum("...ij,...j->...i", operators.compliance, wrench)
     gap = operators.gap + np.einsum("...im,...i->...m", operators.force_twist, wrench)
     if gap.ndim == 1:
-        force, closed = solve_contact(operators.approach, gap, active)
+        force, active = solve_contact(operators.approach, gap)
     else:
-        m = gap.shape[-1]
-        n = int(np.prod(gap.shape[:-1]))
-        force, closed = solve_contacts(operators.approach.reshape(n, m, m), gap.reshape(n, m))
-        force, closed = force.reshape(gap.shape), closed.reshape(gap.shape)
+        m, n = gap.shape[-1], int(np.prod(gap.shape[:-1]))
+        force, active = solve_contacts(operators.approach.reshape(n, m, m), gap.reshape(n, m))
+        force, active = force.reshape(gap.shape), active.reshape(gap.shape)
     moved = free + np.einsum("...im,...m->...i", operators.force_twist, force)
-    return Response(moved, force, closed)
+    return Response(moved, force, active)
 
 
 RATED_FORCE = np.array([0.0, 0.0, -1.0])

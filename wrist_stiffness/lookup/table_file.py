@@ -13,7 +13,6 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
-from math import prod
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
@@ -43,8 +42,9 @@ LARGEST_BYTES = 256 << 20
 _DAMAGED = (
     *(ValueError, EOFError, KeyError, TypeError, SyntaxError, TokenError),
     *(NotImplementedError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile),
+    MemoryError,
 )
-"""What zipfile raises of a damaged archive, and numpy of a damaged array's head."""
+"""What zipfile raises of a damaged archive, and numpy of a damaged array."""
 
 UNITS = "m, rad, N, N m, m/s^2; 6-vectors (translation; rotation) or (force; moment) at O in F"
 
@@ -127,30 +127,18 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
                     raise TableError(
                         f"{path}: states {total} bytes unpacked, more than {LARGEST_BYTES}"
                     )
-                return {part.filename.removesuffix(".npy"): _array(archive, part) for part in parts}
+                arrays = {}
+                for part in parts:
+                    with archive.open(part) as array:
+                        name = part.filename.removesuffix(".npy")
+                        arrays[name] = np.lib.format.read_array(array, allow_pickle=False)
+                return arrays
         except OSError as error:
             raise TableError(f"{path}: cannot be read: {error.strerror or error}") from error
         except _DAMAGED as error:
             raise TableError(
                 f"{path}: damaged or not a table: {' '.join(str(error).split())}"
             ) from error
-
-
-def _array(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> Array:
-    with archive.open(part) as stream:
-        version = np.lib.format.read_magic(stream)
-        if version != (1, 0):
-            raise ValueError(f"{part.filename}: npy version {version} is not 1.0")
-        shape, fortran, kind = np.lib.format.read_array_header_1_0(stream)
-        if kind.hasobject:
-            raise ValueError(f"{part.filename}: objects are not read")
-        # Python's whole numbers, that do not overflow.
-        if prod(shape) * kind.itemsize != part.file_size - stream.tell():
-            raise ValueError(
-                f"{part.filename}: shape {shape} is not that of its {part.file_size} bytes"
-            )
-        array = np.frombuffer(stream.read(), kind)
-        return array.reshape(shape, order="F" if fortran else "C")
 
 
 def _check(table: Table, path: str | Path) -> None:
@@ -176,17 +164,14 @@ def _check(table: Table, path: str | Path) -> None:
         )
 
 
+_OF_TABLE = ("nodes", "operators", "map_values")
+_OF_PARTS = ("flexibility", "weight_motor_side", "weight_platform_side", "platform_weight")
+
+
 def _to_arrays(table: Table) -> dict[str, Array]:
     parts = table.components
-    arrays = {
-        "nodes": table.nodes,
-        "operators": table.operators,
-        "map_values": table.map_values,
-        "flexibility": parts.flexibility,
-        "weight_motor_side": parts.weight_motor_side,
-        "weight_platform_side": parts.weight_platform_side,
-        "platform_weight": parts.platform_weight,
-    }
+    arrays = {name: getattr(table, name) for name in _OF_TABLE}
+    arrays |= {name: getattr(parts, name) for name in _OF_PARTS}
     for joint, contact in parts.contact.items():
         for field in fields(FlangeContact):
             arrays[f"{joint}_{field.name}"] = getattr(contact, field.name)
@@ -201,17 +186,10 @@ def _from_arrays(header: TableHeader, arrays: Mapping[str, Array], checksum: str
         for joint in PASSIVE_JOINTS
         if f"{joint}_gap" in arrays
     }
-    components = ElasticComponents(
-        flexibility=arrays["flexibility"],
-        weight_motor_side=arrays["weight_motor_side"],
-        weight_platform_side=arrays["weight_platform_side"],
-        platform_weight=arrays["platform_weight"],
-        contact=contact,
-        mass=arrays.get("mass"),
-    )
-    return Table(
-        header, components, arrays["nodes"], arrays["operators"], arrays["map_values"], checksum
-    )
+    parts: dict[str, Any] = {name: arrays[name] for name in _OF_PARTS}
+    components = ElasticComponents(**parts, contact=contact, mass=arrays.get("mass"))
+    own: dict[str, Any] = {name: arrays[name] for name in _OF_TABLE}
+    return Table(header, components, **own, checksum=checksum)
 
 
 def _checksum(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:

@@ -34,25 +34,16 @@ def solve_contact(
 
     `approach` (m, m): A [m/N].  `gap` (m,): opening without contact forces; negative where the
     surfaces would overlap [m].  `active` (m,): first guess of the sectors in contact, usually those
-    of the sample before.  Gives `force` (m,): not negative [N], and `active` (m,): sectors in
-    contact.  Raises `InputError` if an input is not finite or the matrix is not positive definite.
+    of the sample before; it leaves no trace.  Gives `force` (m,): not negative [N], and `active`
+    (m,): sectors in contact.  Raises `InputError` if an input is not finite or the matrix is not
+    positive definite.
     """
     if not (np.all(np.isfinite(gap)) and np.all(np.isfinite(approach))):
         raise InputError("contact: a gap or a flexibility is not finite")
-    return settle(approach, gap, active)
-
-
-def settle(
-    approach: Array, gap: Array, guess: NDArray[np.bool_] | None
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Solve the contact problem of finite inputs that belong together (see `solve_contact`).
-
-    The forces are those of the sectors that are found, whatever the guess was: it leaves no trace.
-    """
     gaps = gap.tolist()
     if min(gaps, default=0.0) >= 0.0:
         return np.zeros(len(gap)), np.zeros(len(gap), dtype=bool)
-    closed = gap < 0.0 if guess is None else guess
+    closed = gap < 0.0 if active is None else active
     length_scale = max(max(gaps), -min(gaps))
     least_opening = -RELATIVE_TOLERANCE * length_scale
     fewest, patience = len(gap) + 1, PATIENCE
