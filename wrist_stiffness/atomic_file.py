@@ -45,20 +45,9 @@ def replacing(path: str | Path) -> Iterator[Path]:
     A device or a pipe is written to directly: renaming onto /dev/null would put a file in its
     place, for every program of the machine.  A link stays a link to the new file.
 
-    Parameters
-    ----------
-    path : path
-        File to write; an older one stays until the new one is complete.
-
-    Yields
-    ------
-    Path
-        A temporary file in the same folder, or the device itself.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written; the temporary file is gone then.
+    `path`: file to write; an older one stays until the new one is complete.  Gives a temporary file
+    in the same folder, or the device itself.  Raises `OSError` if the file cannot be written; the
+    temporary file is gone then.
     """
     target = Path(path)
     if target.exists() and not target.is_file():

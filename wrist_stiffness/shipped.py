@@ -13,21 +13,10 @@ PACKAGE = "wrist_stiffness"
 def shipped_file(relative: str) -> Path:
     """Return the path of a file that came with the package.
 
-    Parameters
-    ----------
-    relative
-        Path below the project folder, for example "config/palmieri2015.yaml".
-
-    Returns
-    -------
-    Path
-        An existing file: of the source tree, else of the installation (pip or colcon) that holds
-        the running package, else of the interpreter's, else of a folder in AMENT_PREFIX_PATH.
-
-    Raises
-    ------
-    InputError
-        No such file; the message lists the folders where it was looked for.
+    `relative`: below the project folder, for example "config/palmieri2015.yaml".  Gives an existing
+    file: of the source tree, else of the installation (pip or colcon) that holds the running
+    package, else of the interpreter's, else of a folder in AMENT_PREFIX_PATH.  Raises `InputError`
+    if there is none; it lists the folders where it was looked for.
     """
     folders = _folders()
     for folder in folders:

@@ -80,20 +80,9 @@ def relative(topic: str) -> str:
 def parse_topic_remaps(remaps: Iterable[str]) -> dict[str, str]:
     """Parse ``STANDARD:=ACTUAL``, the form in which commands take topic names.
 
-    Parameters
-    ----------
-    remaps : Iterable[str]
-        One text for each topic; a leading slash may be left out, as in ROS.
-
-    Returns
-    -------
-    dict[str, str]
-        Name in the recording, by standard name.
-
-    Raises
-    ------
-    InputError
-        If a text has another form, names no standard topic, or two speak of the same topic.
+    `remaps`: one text for each topic; a leading slash may be left out, as in ROS.  Gives names in
+    the recording by standard name.  Raises `InputError` if a text has another form, names no
+    standard topic, or two speak of the same topic.
     """
     actual_by_standard: dict[str, str] = {}
     for remap in remaps:

@@ -37,27 +37,14 @@ _READ_AS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """One value of a file.
+    """One value of a file."""
 
-    Attributes
-    ----------
-    value : None, bool, int, float, str, list of Node or dict of str to Node
-        What stands there.
-    file : str
-        As error messages name it.
-    path : str
-        Keys down to here, joined by points; empty for the whole file.
-    line : int
-        Where it begins, from 1; 0 where that is not known.
-    error : type
-        Error of whatever reads the file.
-    """
-
+    # None, bool, int, float, str, list of Node or dict of str to Node
     value: Any
-    file: str
-    path: str
-    line: int
-    error: type[WristError]
+    file: str  # as error messages name it
+    path: str  # keys down to here, joined by points; empty for the whole file
+    line: int  # where it begins, from 1; 0 where that is not known
+    error: type[WristError]  # of whatever reads the file
 
     @property
     def place(self) -> str:

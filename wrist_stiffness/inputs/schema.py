@@ -180,20 +180,9 @@ def record(
 ) -> Schema[Any]:
     """Return the schema of a mapping with certain keys.
 
-    Parameters
-    ----------
-    keys, optional : mapping of str to schema or Quantity
-        Those that must and those that may be there.
-    sources : collection of str
-        Words of which the mapping must say, under `source`, where each of its values is from;
-        empty for none.
-    others : bool
-        Whether it may have other keys as well, which are left unread.
-
-    Returns
-    -------
-    schema
-        Gives what `make` returns.
+    `keys`, `optional`: those that must and those that may be there.  `sources`: words of which the
+    mapping must say, under `source`, where each of its values is from; empty for none.  `others`:
+    whether it may have other keys as well, which are left unread.  Gives what `make` returns.
     """
     schemas = {**keys, **(optional or {})}
 

@@ -13,6 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
+from math import prod
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
@@ -42,9 +43,8 @@ LARGEST_BYTES = 256 << 20
 _DAMAGED = (
     *(ValueError, EOFError, KeyError, TypeError, SyntaxError, TokenError),
     *(NotImplementedError, RuntimeError, struct.error, zlib.error, zipfile.BadZipFile),
-    MemoryError,
 )
-"""What zipfile raises of a damaged archive, and numpy of a damaged array."""
+"""What zipfile raises of a damaged archive, and numpy of a damaged array's head."""
 
 UNITS = "m, rad, N, N m, m/s^2; 6-vectors (translation; rotation) or (force; moment) at O in F"
 
@@ -127,18 +127,30 @@ def _read_arrays(path: str | Path) -> dict[str, Array]:
                     raise TableError(
                         f"{path}: states {total} bytes unpacked, more than {LARGEST_BYTES}"
                     )
-                arrays = {}
-                for part in parts:
-                    with archive.open(part) as array:
-                        name = part.filename.removesuffix(".npy")
-                        arrays[name] = np.lib.format.read_array(array, allow_pickle=False)
-                return arrays
+                return {part.filename.removesuffix(".npy"): _array(archive, part) for part in parts}
         except OSError as error:
             raise TableError(f"{path}: cannot be read: {error.strerror or error}") from error
         except _DAMAGED as error:
             raise TableError(
                 f"{path}: damaged or not a table: {' '.join(str(error).split())}"
             ) from error
+
+
+def _array(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> Array:
+    with archive.open(part) as stream:
+        version = np.lib.format.read_magic(stream)
+        if version != (1, 0):
+            raise ValueError(f"{part.filename}: npy version {version} is not 1.0")
+        shape, fortran, kind = np.lib.format.read_array_header_1_0(stream)
+        if kind.hasobject:
+            raise ValueError(f"{part.filename}: objects are not read")
+        # Python's whole numbers, that do not overflow.
+        if prod(shape) * kind.itemsize != part.file_size - stream.tell():
+            raise ValueError(
+                f"{part.filename}: shape {shape} is not that of its {part.file_size} bytes"
+            )
+        array = np.frombuffer(stream.read(), kind)
+        return array.reshape(shape, order="F" if fortran else "C")
 
 
 def _check(table: Table, path: str | Path) -> None:

@@ -79,49 +79,42 @@ def check_fits(root: Node, geometry: Geometry) -> None:
         )
     found = collision(geometry, poses)
     if found is not None:
-        keys, name = _place_of(found.second, geometry)
-        node = root
-        for key in keys:
-            node = node[key]
+        node, name = _place_of(found.second, root, geometry)
         raise node.refuse(
             f"{name} and {found.first} are in one place at motor angles "
             f"{angles_text(found.theta)}, in the operative workspace"
         )
 
 
-def _place_of(body: str, geometry: Geometry) -> tuple[tuple[str, ...], str]:
-    """Return the keys of the value that places a body, and what the body is called."""
+def _place_of(body: str, root: Node, geometry: Geometry) -> tuple[Node, str]:
+    """Return the value that places a body, and what the body is called."""
     if body in geometry.links:
-        return ("links", body, "arc_radius_mm"), body
+        return root["links"][body]["arc_radius_mm"], body
     if body in geometry.bushings:
-        return ("bushings", body, "radius_mm"), f"the pin of {body}"
+        return root["bushings"][body]["radius_mm"], f"the pin of {body}"
     if body == BOSS:
-        return ("bushings", "joint_4", "radius_mm"), f"the {BOSS}"
-    return ("platform", "centre_mm"), "the plate"
+        return root["bushings"]["joint_4"]["radius_mm"], f"the {BOSS}"
+    return root["platform"]["centre_mm"], "the plate"
 
 
 def _check_material(name: str, material: Node) -> None:
     moduli, density = (material[key].plain for key in ("young_GPa", "density_kg_m3"))
     for young in moduli if isinstance(moduli, list) else [moduli]:
-        _check_density(name, material, young, density)
-
-
-def _check_density(name: str, material: Node, young: float, density: float) -> None:
-    for metal, usual in NAMED.items():
-        for key, value, normal in zip(
-            ("young_GPa", "density_kg_m3"), (young, density), usual, strict=True
-        ):
-            if name.lower().startswith(metal) and not 1 / ALLOYS < value / normal < ALLOYS:
-                raise material[key].refuse(
-                    f"{value:g} is not {name}, which has {normal:g}: another unit?"
-                )
-    speed = np.sqrt(1e9 * young / density)
-    if speed > FASTEST or (density > METAL_DENSITY and speed < SLOWEST_METAL):
-        limit = f"below {FASTEST:g}" if speed > FASTEST else f"at least {SLOWEST_METAL:g}"
-        raise material["young_GPa"].refuse(
-            f"{young:g} with {density:g} kg/m^3 makes a speed of sound of {speed:.3g} m/s, which "
-            f"is {limit} m/s in any material so dense: another unit?"
-        )
+        for metal, usual in NAMED.items():
+            for key, value, normal in zip(
+                ("young_GPa", "density_kg_m3"), (young, density), usual, strict=True
+            ):
+                if name.lower().startswith(metal) and not 1 / ALLOYS < value / normal < ALLOYS:
+                    raise material[key].refuse(
+                        f"{value:g} is not {name}, which has {normal:g}: another unit?"
+                    )
+        speed = np.sqrt(1e9 * young / density)
+        if speed > FASTEST or (density > METAL_DENSITY and speed < SLOWEST_METAL):
+            limit = f"below {FASTEST:g}" if speed > FASTEST else f"at least {SLOWEST_METAL:g}"
+            raise material["young_GPa"].refuse(
+                f"{young:g} with {density:g} kg/m^3 makes a speed of sound of {speed:.3g} m/s, "
+                f"which is {limit} m/s in any material so dense: another unit?"
+            )
 
 
 def _check_bores(root: Node, geometry: Geometry) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.vectors import both_halves
+from wrist_stiffness.mechanism.vectors import IDENTITY, both_halves
 
 LIMB_1 = ("joint_1", "link_1", "joint_2")
 LIMB_2_BASE = ("joint_5", "link_2", "joint_4")
@@ -23,8 +23,6 @@ LIMB_2 = (*LIMB_2_BASE, "link_3", "joint_3")
 """Elastic components from the motor to the platform."""
 
 IN_LIMB_1 = np.array([name in LIMB_1 for name in ELASTIC])
-
-IDENTITY = np.eye(3)
 
 # G = I - Q in limb 1 and G = Q in limb 2, as one formula.
 _G_IDENTITY = np.where(IN_LIMB_1, 1.0, 0.0)[:, None, None] * IDENTITY

@@ -21,6 +21,7 @@ from wrist_stiffness.errors import (
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.vectors import (
+    IDENTITY,
     angle_between,
     cross,
     dot,
@@ -77,8 +78,6 @@ def angle_about(axis: Array, start: Array, end: Array) -> Array:
     """Return the signed angle about `axis` (3,) from `start` (3,) to `end` (..., 3) [rad]."""
     return np.arctan2(end @ (skew(axis) @ start), end @ start - (end @ axis) * (start @ axis))
 
-
-IDENTITY = np.eye(3)
 
 HOME_TOLERANCE = 1e-6
 """Least |sin| of an angle between neighbouring axes, and least |D|, that a home pose may have."""

@@ -72,14 +72,6 @@ def _three(schema: Schema[float]) -> Schema[Array]:
     return read
 
 
-def _orthotropic(**values: Any) -> OrthotropicMaterial:
-    # Tuples, so that equal materials compare equal.
-    plain: dict[str, Any] = {
-        key: tuple(value.tolist()) if np.ndim(value) else value for key, value in values.items()
-    }
-    return OrthotropicMaterial(**plain)
-
-
 # From soft rubber and light foam to beyond diamond and osmium: what lies outside is another unit.
 # Re-entrant foam has the least ratio of any isotropic solid (R. Lakes, Science 235, 1987).
 _MODULUS = number(above=1e-4, below=2000.0)
@@ -100,7 +92,10 @@ _ORTHOTROPIC = record(
         **_REST,
     },
     sources=SOURCES,
-    make=_orthotropic,
+    # Tuples, so that equal materials compare equal.
+    make=lambda young, poisson, shear, **others: OrthotropicMaterial(
+        tuple(young.tolist()), tuple(poisson.tolist()), tuple(shear.tolist()), **others
+    ),
 )
 
 

@@ -48,11 +48,22 @@ _MARKER_COUNT = "other number of markers than at first"
 _OTHER_GAUGES = "other gauges than at first"
 
 
+def stacked(**paths: tuple[str, ...]) -> Extract:
+    """Return the extraction of columns beside each other, (m, k) of k attribute paths by name."""
+    return lambda batch: {name: _stack(batch, *parts) for name, parts in paths.items()}
+
+
+def single(path: str) -> Extract:
+    """Return the extraction of the numbers at an attribute path as ``value`` (m,)."""
+    return lambda batch: {"value": batch.columns[path]}
+
+
 def _stack(batch: Batch, *paths: str) -> FloatArray:
     return np.stack([batch.columns[path] for path in paths], axis=1)
 
 
-def _xyz(prefix: str) -> tuple[str, ...]:
+def xyz(prefix: str) -> tuple[str, ...]:
+    """Return the attribute paths of a vector's components."""
     return tuple(f"{prefix}.{axis}" for axis in "xyz")
 
 
@@ -83,18 +94,13 @@ def joint_rows(joints: tuple[str, ...]) -> Extract:
     return extract
 
 
-def wrench_rows(batch: Batch) -> Rows:
-    """Return wrenches (m, 6) [N, N m], force first."""
-    return {"wrench": _stack(batch, *_xyz("wrench.force"), *_xyz("wrench.torque"))}
-
-
 def pose_rows(prefix: str) -> Extract:
     """Return the extraction of poses at an attribute path, with covariance where it has one."""
 
     def extract(batch: Batch) -> Rows:
         rows = {
-            "position": _stack(batch, *_xyz(f"{prefix}.position")),
-            "quaternion": _stack(batch, *_xyz(f"{prefix}.orientation"), f"{prefix}.orientation.w"),
+            "position": _stack(batch, *xyz(f"{prefix}.position")),
+            "quaternion": _stack(batch, *xyz(f"{prefix}.orientation"), f"{prefix}.orientation.w"),
         }
         if "pose.covariance" in batch.columns:
             rows["covariance"] = batch.columns["pose.covariance"].reshape(-1, 6, 6)
@@ -115,7 +121,7 @@ def marker_rows() -> Extract:
             return _MARKER_COUNT
         if not count:
             return {"position": np.empty((batch.indices.size, 0, 3))}
-        paths = [_xyz(f"poses.{marker}.position") for marker in range(count)]
+        paths = [xyz(f"poses.{marker}.position") for marker in range(count)]
         return {"position": np.stack([_stack(batch, *path) for path in paths], axis=1)}
 
     return extract
@@ -135,16 +141,6 @@ def gauge_rows() -> Extract:
         return {"value": batch.columns["position"], "names": names}
 
     return extract
-
-
-def temperature_rows(batch: Batch) -> Rows:
-    """Return temperatures (m,) [°C]."""
-    return {"value": batch.columns["temperature"]}
-
-
-def float_rows(batch: Batch) -> Rows:
-    """Return plain numbers (m,)."""
-    return {"value": batch.columns["data"]}
 
 
 def text_rows(batch: Batch) -> Rows:

@@ -205,16 +205,11 @@ class Recording:
         `topics`: names to keep; None keeps all whose type is known.
         """
         self._undecodable.clear()
-        for channel, log_time_ns, payload in self.raw_messages(topics):
-            message_type = channel.message_type
-            if message_type is None:
-                continue
-            try:
-                message = decode(message_type, payload)
-            except RecordingError:
-                self._undecodable[channel.topic] += 1
-                continue
-            yield channel.topic, log_time_ns, message
+        for part in self._parts(topics):
+            messages, places = self.decoded(part, np.arange(len(part)))
+            for message, place in zip(messages, places.tolist(), strict=True):
+                channel = part.channels[int(part.channel[place])]
+                yield channel.topic, int(part.time_ns[place]), message
 
     def _contents(self, index: McapIndex, position: int) -> Contents | None:
         """Unpack a chunk; report what is wrong with it, None where it cannot be read.

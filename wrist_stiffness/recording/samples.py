@@ -24,14 +24,14 @@ from wrist_stiffness.recording.collector import (
     FloatArray,
     Rows,
     TimeArray,
-    float_rows,
     gauge_rows,
     joint_rows,
     marker_rows,
     pose_rows,
-    temperature_rows,
+    single,
+    stacked,
     text_rows,
-    wrench_rows,
+    xyz,
 )
 from wrist_stiffness.recording.messages import (
     Float64,
@@ -269,13 +269,14 @@ def _collectors_of(
         raise RecordingError(
             f"{recording.path} has no topic {', '.join(absent)}; its topics are {present}"
         )
+    wrench = stacked(wrench=(*xyz("wrench.force"), *xyz("wrench.torque")))
     wanted: dict[str, list[tuple[type[Message], Extract, tuple[str, ...]]]] = {
         names.JOINT_STATES: [(JointState, joint_rows(joints), ("position",))],
         names.MOTOR_COMMANDS: [(JointState, joint_rows(joints), ("position",))],
-        names.LOAD_ESTIMATE: [(WrenchStamped, wrench_rows, ("wrench",))],
+        names.LOAD_ESTIMATE: [(WrenchStamped, wrench, ("wrench",))],
         names.PLATFORM_MARKERS: [(PoseArray, marker_rows(), ())],
         names.GAUGE_READINGS: [(JointState, gauge_rows(), ())],
-        names.TEMPERATURES: [(Temperature, temperature_rows, ("value",))],
+        names.TEMPERATURES: [(Temperature, single("temperature"), ("value",))],
         names.RECORDING_NOTES: [(String, text_rows, ())],
     }
     for standard in (names.PLATFORM_POSE, names.FRAME_POSE):
@@ -285,7 +286,7 @@ def _collectors_of(
         ]
     topics = {remaps.get(standard, standard): kinds for standard, kinds in wanted.items()}
     for topic in _covariates(recording, remaps).values():
-        topics[topic] = [(Float64, float_rows, ("value",))]
+        topics[topic] = [(Float64, single("data"), ("value",))]
     return {
         topic: _collector(recording, topic, types[topic], kinds)
         for topic, kinds in topics.items()
