@@ -123,9 +123,10 @@ class FixedLayout(Generic[AnyMessage]):
 
     def write(self, rows: NDArray[np.uint8], leaf: Leaf, column: NDArray[Any]) -> None:
         """Write numbers (m,) or (m, k), or times (m,) [ns], into payloads (m, size)."""
-        parts = [(column, PRIMITIVES[leaf.element].format)]
         if leaf.element in SECONDS_NANOSECONDS:
             parts = [(column // _SECOND_NS, "i"), (column % _SECOND_NS, "I")]
+        else:
+            parts = [(column, PRIMITIVES[leaf.element].format)]
         begin = leaf.begin
         for numbers, format_ in parts:
             kind = np.dtype(format_).newbyteorder(self._byte_order)
