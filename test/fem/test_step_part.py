@@ -57,7 +57,7 @@ def test_the_command_prints_what_a_geometry_file_takes(geometry, tmp_path, capsy
     assert main(["table", "part", str(tmp_path / "link.step"), "--link", "link_1"]) == 0
     values = yaml.safe_load(SHIPPED.read_text())
     values["links"]["link_1"] |= yaml.safe_load(capsys.readouterr().out)
-    own = geometry_from_values(values).links["link_1"].flexibility
+    own = geometry_from_values(values).links["link_1"].stiffness.flexibility
     shipped = load_table(shipped_file("precomputed/palmieri2015.npz")).components
     ratio = eigvalsh(own, shipped.flexibility[ELASTIC.index("link_1")])
     np.testing.assert_allclose(ratio, 1.0, atol=OTHER_MESH)

@@ -48,7 +48,7 @@ def read(part, block):
     group = "links" if part.startswith("link") else "bushings"
     values[group][part]["stiffness"] = block
     parts = getattr(geometry_from_values(values), group)
-    return parts[part].flexibility
+    return parts[part].stiffness.flexibility
 
 
 @pytest.mark.parametrize("part", ["link_1", "link_2", "link_3", "joint_1", "joint_5"])

@@ -92,8 +92,8 @@ def place_components(
     contact: dict[str, FlangeContact] = {}
     for part in parts:
         element, home = condensed[part.solid], part.home
-        own = (geometry.links | geometry.bushings)[part.name].flexibility
-        bends = home.screw @ element.flexibility @ home.screw.T if own is None else own
+        own = (geometry.links | geometry.bushings)[part.name].stiffness
+        bends = home.screw @ element.flexibility @ home.screw.T if own is None else own.flexibility
         both = np.kron(np.eye(2), home.wrench)
         weights = np.vstack([element.weight_motor_side, element.weight_platform_side])
         weight, inertia = both @ weights @ home.rotation.T, both @ element.mass @ both.T

@@ -169,7 +169,7 @@ def _link_part(geometry: Geometry, name: str) -> Part:
     angle = round(math.atan2(sine, float(motor_side @ platform_side)), 12)
     normal = normal / sine
     axes = np.column_stack([motor_side, np.cross(normal, motor_side), normal])
-    bar = replace(geometry.links[name], flexibility=None)
+    bar = replace(geometry.links[name], stiffness=None)
     solid = Solid(bar, angle, "motor_bore", "platform_bore", ())
     return Part(name, solid, Placement(axes, np.zeros(3)))
 
@@ -187,7 +187,7 @@ def _bushing_part(geometry: Geometry, name: str, rings: int) -> Part:
         radius=0.0,
         inner_gap=None if bushing.inner_gap is None else 0.0,
         outer_gap=None if bushing.outer_gap is None else 0.0,
-        flexibility=None,
+        stiffness=None,
     )
     if name in PASSIVE_JOINTS:
         flanges = tuple(end for end in FLANGES if gaps[end] is not None)

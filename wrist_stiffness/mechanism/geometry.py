@@ -12,6 +12,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ENDS, Array
 from wrist_stiffness.mechanism.material import AnyMaterial, Material
+from wrist_stiffness.mechanism.own_stiffness import OwnStiffness
 
 ROUNDING = 1e-9
 """Share by which a number may pass a limit that it stands at."""
@@ -32,9 +33,8 @@ class LinkDimensions:
     motor_bore: float
     platform_bore: float
     material: AnyMaterial
-    # (6, 6), screw of the platform side for unit wrenches at O in F at home, given by the file
-    # instead of the bar's; the bar still says what it weighs [m/N, rad/N, rad/(N m)]
-    flexibility: Array | None = None
+    # given by the file instead of the bar's; the bar still says what it weighs
+    stiffness: OwnStiffness | None = None
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,9 @@ class BushingDimensions:
     inner_gap: float | None
     outer_gap: float | None
     material: AnyMaterial
-    # as a link's: given by the file, or of its ball bearings, instead of the sleeve's, where no
-    # flange takes part in contact
-    flexibility: Array | None = None
+    # given by the file, or of its ball bearings, instead of the sleeve's, where no flange takes
+    # part in contact
+    stiffness: OwnStiffness | None = None
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ from wrist_stiffness.mechanism.geometry import (
 )
 from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.material import AnyMaterial, Material, read_material
-from wrist_stiffness.mechanism.own_stiffness import bearing_pair, own_flexibility
+from wrist_stiffness.mechanism.own_stiffness import bearing_pair, own_stiffness
 from wrist_stiffness.mechanism.vectors import unit
 
 SCHEMA = 1
@@ -221,7 +221,7 @@ def _link(material: Schema[AnyMaterial]) -> Schema[LinkDimensions]:
 def _with_own(node: Node, part: P, distance: float, free: Array) -> P:
     if "stiffness" not in node.value:
         return part
-    return replace(part, flexibility=own_flexibility(node["stiffness"], distance, free))
+    return replace(part, stiffness=own_stiffness(node["stiffness"], distance, free))
 
 
 def _bushing(material: Schema[AnyMaterial], axes: dict[str, Array]) -> Schema[BushingDimensions]:
@@ -254,7 +254,7 @@ def _bushing(material: Schema[AnyMaterial], axes: dict[str, Array]) -> Schema[Bu
         given = node.value.get("stiffness")
         if isinstance(given, Node) and isinstance(given.value, dict) and "bearings" in given.value:
             pair = record({"bearings": bearing_pair(bushing.radius * axis, axis)})
-            return replace(bushing, flexibility=pair(given)["bearings"])
+            return replace(bushing, stiffness=pair(given)["bearings"])
         slide_and_turn = np.kron(np.eye(2), axis[:, None]).astype(np.float64)
         return _with_own(node, bushing, abs(bushing.radius), slide_and_turn)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from wrist_stiffness.inputs.document import Node
@@ -25,21 +27,28 @@ LOOSE = 1e-9
 """Stiffness over the largest one, both scaled to forces at the part, that counts as none."""
 
 
+@dataclass(frozen=True, eq=False)
+class OwnStiffness:
+    """A part between its two frames."""
+
+    # (6, 6), screw of the platform-side frame against the motor-side one for unit wrenches, at O in
+    # F with the wrist at home [m/N, rad/N, rad/(N m)]; none where the part holds nothing
+    flexibility: Array
+
+
 _READ = record(
     {"matrix_N_mm": list_of(vector(6))},
     {"origin_mm": Quantity(vector()), "x": direction, "y": direction},
 )
 
 
-def own_flexibility(node: Node, distance: float, free: Array) -> Array:
+def own_stiffness(node: Node, distance: float, free: Array) -> OwnStiffness:
     """Read the stiffness of a part: wrenches [N, N mm] by row for twists [mm, rad] by column.
 
     `node`: `matrix_N_mm`, and the frame in F at home if it is not O and F: `origin_mm`, `x`, `y`.
     `distance`: of the part from O [m].  `free` (6, k): twists at O that it need not hold: slide and
-    turn of a joint; none for a link.  Gives (6, 6): screw of the platform-side frame against the
-    motor-side one for unit wrenches, at O in F with the wrist at home [m/N, rad/N, rad/(N m)]; none
-    where the part holds nothing.  Raises `GeometryError` if the matrix is not symmetric, not
-    definite or lets go of what it must hold.
+    turn of a joint; none for a link.  Gives `OwnStiffness`: in SI units.  Raises `GeometryError` if
+    the matrix is not symmetric, not definite or lets go of what it must hold.
     """
     read, place = _READ(node), node["matrix_N_mm"]
     matrix = np.array(read["matrix_N_mm"])
@@ -59,11 +68,11 @@ def own_flexibility(node: Node, distance: float, free: Array) -> Array:
     axes = np.column_stack([x, y, cross(x, y)])
     wrench = wrenches_to_origin(read.get("origin", np.zeros(3)), axes)
     at_frame = (matrix + matrix.T) / 2.0 / IN_MILLIMETRES
-    return _inverse(place, wrench @ at_frame @ wrench.T, distance, free)
+    return OwnStiffness(_inverse(place, wrench @ at_frame @ wrench.T, distance, free))
 
 
-def bearing_pair(centre: Array, axis: Array) -> Schema[Array]:
-    """Return the schema of the flexibility of a preloaded pair of ball bearings on a free axis.
+def bearing_pair(centre: Array, axis: Array) -> Schema[OwnStiffness]:
+    """Return the schema of a preloaded pair of ball bearings on an axis that turns freely.
 
     Of one bearing `radial_N_um` and `axial_N_um`; `distance_mm` between the pressure centres, where
     the lines of contact meet the axis.  Balls that share a preload evenly are exactly a radial and
@@ -74,14 +83,14 @@ def bearing_pair(centre: Array, axis: Array) -> Schema[Array]:
     """
     keys = dict.fromkeys(("radial_N_um", "axial_N_um", "distance_mm"), Quantity(number(above=0.0)))
 
-    def make(radial: float, axial: float, distance: float) -> Array:
+    def make(radial: float, axial: float, distance: float) -> OwnStiffness:
         along = np.outer(axis, axis)
         across = np.eye(3) - along
         flexibility = np.zeros((6, 6))
         flexibility[:3, :3] = across / (2.0 * radial) + along / (2.0 * axial)
         flexibility[3:, 3:] = across * 2.0 / (radial * distance**2)
         to_origin = screws_to_origin(centre)
-        return np.asarray(to_origin @ flexibility @ to_origin.T)
+        return OwnStiffness(to_origin @ flexibility @ to_origin.T)
 
     return record(keys, make=make)
 
