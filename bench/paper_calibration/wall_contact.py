@@ -25,7 +25,7 @@ from wrist_stiffness.fem.factor import factorise
 from wrist_stiffness.fem.one_sided import patch_bushing
 from wrist_stiffness.fem.parts import ElasticBody, assemble_body, wrist_parts
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.mechanism.contact import settle
+from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.geometry_file import load_geometry
 
 JOINT, RINGS, LEVELS = "joint_2", 16, 6
@@ -59,7 +59,7 @@ def main() -> None:
     for name, motion in MOTIONS.items():
         screw = np.array(motion)
         by_patches, by_nodes = (
-            -screw @ wrench @ settle(flexibility, wrench.T @ screw, None)[0]
+            -screw @ wrench @ solve_contact(flexibility, wrench.T @ screw, None)[0]
             for flexibility, wrench in (patches, nodes)
         )
         judged = -screw @ by_calculix(body, screw)
