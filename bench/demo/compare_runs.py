@@ -11,15 +11,24 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from wrist_stiffness.commands.replay import pose_message
 from wrist_stiffness.commands.signals_ahead import SignalsAhead
 from wrist_stiffness.compensation.load_history import LoadHistory
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import StaleLoadError, WristError
+from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.recording.messages import Header, JointState, PoseWithCovarianceStamped
+from wrist_stiffness.recording.messages import (
+    Header,
+    JointState,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+)
 from wrist_stiffness.recording.reader import open_recording
 from wrist_stiffness.topics import (
     BASE_FRAME,
@@ -140,6 +149,15 @@ def _explained_by_late_loads(
                     running.advance(stamp_ns, theta, load, theta_dot)
                 break
     return explained
+
+
+def pose_message(header: Header, twist: Array, covariance: Array) -> PoseWithCovarianceStamped:
+    """Return a twist (6,) at O in F [m, rad] with its covariance (6, 6) as a message."""
+    position, quaternion = pose_of_twist(twist)
+    pose = Pose(Point(*position.tolist()), Quaternion(*quaternion.tolist()))
+    return PoseWithCovarianceStamped(
+        header, PoseWithCovariance(pose, tuple(covariance.ravel().tolist()))
+    )
 
 
 def _newest_first(loads: LoadHistory, stamp_ns: int) -> Iterator[Load]:

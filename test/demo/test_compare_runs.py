@@ -2,9 +2,9 @@
 
 import numpy as np
 import yaml
-from compare_runs import compare_runs
+from compare_runs import compare_runs, pose_message
 
-from wrist_stiffness.commands.replay import pose_message, replay
+from wrist_stiffness.commands.replay import replay
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.error_model import Load
 from wrist_stiffness.model.model_file import load_model

@@ -7,7 +7,7 @@ live run.  Messages are matched by their stamp, those without one by their log t
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,15 +16,8 @@ import numpy as np
 from wrist_stiffness.commands.replay import OUTPUTS
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.recording import messages as msg
 from wrist_stiffness.recording.cdr import decode
-from wrist_stiffness.recording.messages import (
-    MESSAGE_TYPES,
-    Float64MultiArray,
-    JointState,
-    JointTrajectory,
-    Message,
-    PoseWithCovarianceStamped,
-)
 from wrist_stiffness.recording.reader import RawMessage, Recording, open_recording
 from wrist_stiffness.topics import MILLIDEGREES
 
@@ -107,11 +100,11 @@ def _payloads(source: Recording, topic: str) -> dict[Key, RawMessage]:
     return found
 
 
-def _decoded(raw: RawMessage) -> Message:
+def _decoded(raw: RawMessage) -> msg.Message:
     kind = raw.channel.ros_type
-    if kind not in MESSAGE_TYPES:
+    if kind not in msg.MESSAGE_TYPES:
         raise RecordingError(f"{raw.channel.topic} carries {kind}, which no replay writes")
-    return decode(MESSAGE_TYPES[kind], raw.payload)
+    return decode(msg.MESSAGE_TYPES[kind], raw.payload)
 
 
 def _changes(first: Recording, second: Recording, topic: str) -> TopicChanges:
@@ -122,13 +115,14 @@ def _changes(first: Recording, second: Recording, topic: str) -> TopicChanges:
     for key in common:
         if before[key].payload == after[key].payload:
             continue
-        old, new = _decoded(before[key]), _decoded(after[key])
-        if _form(old) != _form(new):
+        (old, old_form), (new, new_form) = _said(_decoded(before[key])), _said(_decoded(after[key]))
+        if old_form != new_form or any(len(old[name]) != len(new[name]) for name in old):
             changed.append(key[0])
             continue
-        beyond = [(name, size) for name, size in _sizes(old, new) if not size <= TOLERANCES[name]]
+        sizes = {name: _change(name, np.array(old[name]), np.array(new[name])) for name in old}
+        beyond = {name: size for name, size in sizes.items() if not size <= TOLERANCES[name]}
         changed += [key[0]] if beyond else []
-        for name, size in beyond:
+        for name, size in beyond.items():
             if name not in largest or size > largest[name].size:
                 largest[name] = LargestChange(name, size, key[0])
     return TopicChanges(
@@ -142,63 +136,41 @@ def _changes(first: Recording, second: Recording, topic: str) -> TopicChanges:
     )
 
 
-def _form(message: Message) -> tuple[object, ...]:
-    """Everything in a message that is no quantity."""
-    if isinstance(message, PoseWithCovarianceStamped):
-        return PoseWithCovarianceStamped, message.header.frame_id
-    if isinstance(message, JointState):
-        counts = len(message.position), len(message.velocity), len(message.effort)
-        return JointState, message.header.frame_id, message.name, *counts
-    if isinstance(message, JointTrajectory):
-        sizes = [
-            (len(point.positions), len(point.velocities), len(point.accelerations))
-            for point in message.points
-        ]
-        return JointTrajectory, message.header.frame_id, message.joint_names, *sizes
-    if isinstance(message, Float64MultiArray):
-        return Float64MultiArray, len(message.data)
-    return (type(message),)
-
-
-def _sizes(old: Message, new: Message) -> Iterable[tuple[str, float]]:
-    """By how much each quantity of two messages of one form differs; NaN where one is NaN."""
-    if isinstance(old, PoseWithCovarianceStamped) and isinstance(new, PoseWithCovarianceStamped):
-        places, turns = zip(_pose(old), _pose(new), strict=True)
-        yield SHIFT, 1e6 * float(np.linalg.norm(places[1] - places[0]))
-        # Unit quaternions differ by half the angle between them, to second order.
-        apart = min(np.linalg.norm(turns[1] - turns[0]), np.linalg.norm(turns[1] + turns[0]))
-        yield TURN, MILLIDEGREES * 2.0 * float(apart)
-        before, after = (np.reshape(m.pose.covariance, (6, 6)) for m in (old, new))
-        scale = np.sqrt(np.abs(before.diagonal()))
-        relative = np.abs(after - before) / np.maximum(np.outer(scale, scale), 1e-300)
-        yield COVARIANCE, 1e2 * float(relative.max())
-        return
-    second = _of_motors(new)
-    for name, first in _of_motors(old).items():
-        yield name, MILLIDEGREES * _apart(first, second[name])
-
-
-def _of_motors(message: Message) -> dict[str, Sequence[float]]:
-    """Return what a message says of the motors, by quantity [rad, rad/s, rad/s^2]."""
-    if isinstance(message, JointState):
-        return {ANGLE: message.position, SPEED: message.velocity}
-    if isinstance(message, JointTrajectory):
+def _said(message: msg.Message) -> tuple[dict[str, Sequence[float]], tuple[object, ...]]:
+    """Return the numbers of a message by quantity [m, rad, s], and everything else in it."""
+    if isinstance(message, msg.PoseWithCovarianceStamped):
+        place, turn = message.pose.pose.position, message.pose.pose.orientation
+        numbers: dict[str, Sequence[float]] = {
+            SHIFT: (place.x, place.y, place.z),
+            TURN: (turn.x, turn.y, turn.z, turn.w),
+            COVARIANCE: message.pose.covariance,
+        }
+        return numbers, (message.header.frame_id,)
+    if isinstance(message, msg.JointState):
+        form = message.header.frame_id, message.name, len(message.effort)
+        return {ANGLE: message.position, SPEED: message.velocity}, form
+    if isinstance(message, msg.JointTrajectory):
         points = message.points
-        return {
+        numbers = {
             ANGLE: [value for point in points for value in point.positions],
             SPEED: [value for point in points for value in point.velocities],
             ACCELERATION: [value for point in points for value in point.accelerations],
         }
-    return {ANGLE: message.data} if isinstance(message, Float64MultiArray) else {}
+        return numbers, (message.header.frame_id, message.joint_names, len(points))
+    return ({ANGLE: message.data} if isinstance(message, msg.Float64MultiArray) else {}), ()
 
 
-def _pose(message: PoseWithCovarianceStamped) -> tuple[Array, Array]:
-    place, turn = message.pose.pose.position, message.pose.pose.orientation
-    return np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w])
-
-
-def _apart(first: Sequence[float], second: Sequence[float]) -> float:
-    """Largest difference; NaN that both have are equal."""
-    a, b = np.array(first, dtype=float), np.array(second, dtype=float)
-    differences = np.abs(b - a)[~(np.isnan(a) & np.isnan(b))]
-    return float(differences.max(initial=0.0))
+def _change(quantity: str, old: Array, new: Array) -> float:
+    """Return by how much a quantity differs, in its unit; NaN where one alone is NaN."""
+    if quantity == SHIFT:
+        return 1e6 * float(np.linalg.norm(new - old))
+    if quantity == TURN:
+        # Unit quaternions differ by half the angle between them, to second order.
+        apart = min(np.linalg.norm(new - old), np.linalg.norm(new + old))
+        return MILLIDEGREES * 2.0 * float(apart)
+    if quantity == COVARIANCE:
+        scale = np.sqrt(np.abs(old.reshape(6, 6).diagonal()))
+        limits = np.maximum(np.outer(scale, scale), 1e-300).ravel()
+        return 1e2 * float((np.abs(new - old) / limits).max())
+    changes = np.abs(new - old)[~(np.isnan(old) & np.isnan(new))]
+    return MILLIDEGREES * float(changes.max(initial=0.0))

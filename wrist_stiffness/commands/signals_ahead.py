@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +11,8 @@ from numpy.typing import NDArray
 from wrist_stiffness.compensation.intake import transform_of
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import WristError
-from wrist_stiffness.recording.batch import decode_batches
-from wrist_stiffness.recording.messages import (
-    Float64,
-    Message,
-    Temperature,
-    TFMessage,
-    WrenchStamped,
-)
+from wrist_stiffness.recording import messages as msg
+from wrist_stiffness.recording.batch import Batch, decode_batches
 from wrist_stiffness.recording.raw_block import RawBlock
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.topics import COVARIATES
@@ -32,17 +25,20 @@ Integers = NDArray[np.int64]
 
 @dataclass
 class _Run:
-    """Messages of one topic, one after the other: loads as arrays, others one by one."""
+    """Messages of one topic: loads of one layout as arrays, others one by one."""
 
     topic: str
     time_ns: Integers  # (k,), log times [ns]
-    # `stamps`, `frame_id`, `wrenches`: of loads that share their frame, (k,) [ns] and (k, 6) [N, N
-    # m]
+    messages: Sequence[msg.Message] = ()
+    # `stamps`, `frame_id`, `wrenches`: of loads as arrays, (k,) [ns] and (k, 6) [N, N m]
     stamps: Integers | None = None
     frame_id: str = ""
     wrenches: NDArray[np.float64] | None = None
-    messages: Sequence[Message] = ()  # all others
     next: int = 0
+
+    def until(self, end_ns: int) -> slice:
+        """Return those that were not heard yet, up to a log time [ns]."""
+        return slice(self.next, int(np.searchsorted(self.time_ns, end_ns, side="right")))
 
 
 class SignalsAhead:
@@ -62,7 +58,7 @@ class SignalsAhead:
     ) -> None:
         self._source = source
         self._blocks = source.blocks(tuple(names))
-        self._runs: deque[_Run] = deque()
+        self._runs: list[_Run] = []
         self._read_to_ns = -1
         self._names = names
         self._streams = streams
@@ -72,12 +68,12 @@ class SignalsAhead:
         """Hear what may belong to a sample logged at this time [ns]."""
         end_ns = log_time_ns + LOOKAHEAD_NS
         self._fetch(end_ns)
-        while self._runs and self._runs[0].time_ns[self._runs[0].next] <= end_ns:
-            run = self._runs[0]
-            begin, run.next = run.next, int(np.searchsorted(run.time_ns, end_ns, side="right"))
-            if run.next == len(run.time_ns):
-                self._runs.popleft()
-            self._hear(run, slice(begin, run.next))
+        for run in self._runs:
+            part = run.until(end_ns)
+            if part.stop > part.start:
+                self._hear(run, part)
+                run.next = part.stop
+        self._runs = [run for run in self._runs if run.next < len(run.time_ns)]
 
     def rises_until(self, log_time_ns: int, first_ns: int, slow: bool) -> bool:
         """Tell whether `read_for` can be called once for many samples.
@@ -88,34 +84,31 @@ class SignalsAhead:
         """
         end_ns = log_time_ns + LOOKAHEAD_NS
         self._fetch(end_ns)
-        stamps = [
-            run.stamps[run.next : np.searchsorted(run.time_ns, end_ns, side="right")]
-            for run in self._runs
-            if run.stamps is not None
-        ]
-        together = np.concatenate([np.empty(0, dtype=np.int64), *stamps])
-        return (not slow or self._slow_rise(end_ns, first_ns)) and all(
-            stream.loads.rises_with(together) and stream.loads.keeps(together, first_ns)
-            for stream in self._streams
-        )
-
-    def _slow_rise(self, end_ns: int, first_ns: int) -> bool:
         heard: dict[tuple[str, str], list[int]] = {}
+        load_stamps = [np.empty(0, dtype=np.int64)]
         for run in self._runs:
-            end = int(np.searchsorted(run.time_ns, end_ns, side="right"))
-            times = run.time_ns[run.next : end].tolist()
-            for at_ns, message in zip(times, run.messages[run.next : end], strict=False):
-                if isinstance(message, Temperature):
+            part = run.until(end_ns)
+            if run.stamps is not None:
+                load_stamps.append(run.stamps[part])
+            times = run.time_ns[part].tolist()
+            for at_ns, message in zip(times, run.messages[part], strict=False):
+                if isinstance(message, msg.WrenchStamped):
+                    load_stamps.append(np.array([message.header.stamp_ns]))
+                elif isinstance(message, msg.Temperature):
                     of = "temperatures", message.header.frame_id
                     heard.setdefault(of, []).append(message.header.stamp_ns)
-                elif isinstance(message, Float64):
+                elif isinstance(message, msg.Float64):
                     of = "covariates", self._names[run.topic].removeprefix(COVARIATES)
                     heard.setdefault(of, []).append(at_ns)
-        return all(
-            getattr(stream, kind).rises_with(name, stamps, first_ns)
-            for (kind, name), stamps in heard.items()
-            for stream in self._streams
-        )
+        together = np.concatenate(load_stamps)
+        for stream in self._streams:
+            loads = stream.loads
+            if not (loads.rises_with(together) and loads.keeps(together, first_ns)):
+                return False
+            for (kind, name), stamps in heard.items() if slow else ():
+                if not getattr(stream, kind).rises_with(name, stamps, first_ns):
+                    return False
+        return True
 
     def _fetch(self, end_ns: int) -> None:
         while self._read_to_ns <= end_ns:
@@ -142,77 +135,47 @@ class SignalsAhead:
                 self._refuse(run.topic, error)
 
 
-def _runs_of(source: Recording, block: RawBlock) -> list[_Run]:
-    """Return the messages of a block in their order, loads in batches."""
-    decoded: list[_Run] = []
-    rows: list[Integers] = []
-    for topic, own in block.topics().items():
-        channel = block.channels[int(block.channel[own[0]])]
-        if channel.message_type is None:
-            continue
-        if channel.message_type is WrenchStamped:
-            batches, undecodable = decode_batches(WrenchStamped, block.payloads(own))
-            for batch in batches:
-                columns = batch.columns
-                names = ("force", "torque")
-                wrenches = [columns[f"wrench.{name}.{axis}"] for name in names for axis in "xyz"]
-                decoded.append(
-                    _Run(
-                        topic,
-                        block.time_ns[own[batch.indices]],
-                        columns["header.stamp_ns"],
-                        _frame_of(batch.first),
-                        np.stack(wrenches, axis=1),
-                    )
-                )
-                rows.append(own[batch.indices])
-            source.undecodable(topic, len(undecodable))
-            continue
-        messages, places = source.decoded(block, own)
-        decoded.append(_Run(topic, block.time_ns[places], messages=messages))
-        rows.append(places)
-    return _in_order(decoded, rows)
-
-
-def _frame_of(message: Message) -> str:
-    return message.header.frame_id if isinstance(message, WrenchStamped) else ""
-
-
-def _in_order(runs: list[_Run], rows: list[Integers]) -> list[_Run]:
-    """Cut runs where messages of other runs stand between theirs."""
-    if len(runs) < 2:
-        return runs
-    number = np.concatenate([np.full(len(own), i) for i, own in enumerate(rows)])
-    within = np.concatenate([np.arange(len(own)) for own in rows])
-    order = np.argsort(np.concatenate(rows))
-    number, within = number[order], within[order]
-    cuts = np.flatnonzero(np.diff(number)) + 1
-    return [
-        _part(runs[int(of[0])], slice(int(place[0]), int(place[-1]) + 1))
-        for of, place in zip(np.split(number, cuts), np.split(within, cuts), strict=True)
-        if len(of)
+def _runs_of(source: Recording, block: RawBlock) -> Iterator[_Run]:
+    """Yield the messages of a block by topic, cut where a frame is told: loads need it before."""
+    frames = [
+        place for place, each in enumerate(block.channels) if each.message_type is msg.TFMessage
     ]
+    cuts = np.flatnonzero(np.diff(np.isin(block.channel, frames))) + 1
+    for part in np.split(np.arange(len(block)), cuts):
+        piece = block.take(part)
+        for topic, rows in piece.topics().items():
+            channel = piece.channels[int(piece.channel[rows[0]])]
+            if channel.message_type is msg.WrenchStamped:
+                batches, undecodable = decode_batches(msg.WrenchStamped, piece.payloads(rows))
+                if len(batches) == 1:
+                    source.undecodable(topic, len(undecodable))
+                    yield _loads(topic, piece.time_ns[rows], batches[0])
+                    continue
+            if channel.message_type is not None:
+                messages, places = source.decoded(piece, rows)
+                yield _Run(topic, piece.time_ns[places], messages)
 
 
-def _part(run: _Run, part: slice) -> _Run:
-    return _Run(
-        run.topic,
-        run.time_ns[part],
-        None if run.stamps is None else run.stamps[part],
-        run.frame_id,
-        None if run.wrenches is None else run.wrenches[part],
-        run.messages[part],
-    )
+def _loads(topic: str, time_ns: Integers, batch: Batch) -> _Run:
+    names = [f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in "xyz"]
+    wrenches = np.stack([batch.columns[name] for name in names], axis=1)
+    stamps = batch.columns["header.stamp_ns"]
+    frame_id = batch.first.header.frame_id  # type: ignore[attr-defined]
+    return _Run(topic, time_ns[batch.indices], (), stamps, frame_id, wrenches)
 
 
-def _hear(stream: Stream, standard: str, log_time_ns: int, message: Message) -> None:
-    if isinstance(message, TFMessage):
+def _hear(stream: Stream, standard: str, log_time_ns: int, message: msg.Message) -> None:
+    if isinstance(message, msg.TFMessage):
         for step in message.transforms:
             stream.on_static_transforms([transform_of(step)])
-    elif isinstance(message, Temperature):
+    elif isinstance(message, msg.WrenchStamped):
+        header, force, torque = message.header, message.wrench.force, message.wrench.torque
+        parts = (force.x, force.y, force.z), (torque.x, torque.y, torque.z)
+        stream.loads.add(header.stamp_ns, header.frame_id, *parts)
+    elif isinstance(message, msg.Temperature):
         stream.temperatures.add(
             message.header.frame_id, message.header.stamp_ns, message.temperature
         )
-    elif isinstance(message, Float64):
+    elif isinstance(message, msg.Float64):
         # It has no stamp of its own: a node takes the time of arrival.
         stream.covariates.add(standard.removeprefix(COVARIATES), log_time_ns, message.data)

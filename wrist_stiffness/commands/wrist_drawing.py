@@ -16,7 +16,7 @@ from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import frame_about, triad
-from wrist_stiffness.recording.cdr import Leaf, encode
+from wrist_stiffness.recording.cdr import encode
 from wrist_stiffness.recording.fixed_layout import FixedLayout
 from wrist_stiffness.recording.messages import (
     ColorRGBA,
@@ -36,7 +36,8 @@ ACTUAL = ColorRGBA(0.95, 0.5, 0.1, 0.8)
 ARROW = ColorRGBA(0.8, 0.1, 0.1, 1.0)
 
 ARC_POINTS = 25
-STAMPS = "header.stamp_ns"
+LEGEND = 60
+"""Letters of the legend."""
 
 
 class Pace:
@@ -79,7 +80,11 @@ class WristDrawing:
         plate = geometry.platform
         # A cylinder stands along its own z.
         self._upright = np.roll(frame_about(plate.normal), -1, axis=1)
-        self._templates: dict[int, tuple[bytes, FixedLayout[Any], dict[str, list[Leaf]]]] = {}
+        # What stays in all pictures, and where their numbers are; those of points, and of a pose's
+        # place and turn, follow one another.
+        self._template = encode(MarkerArray(self._markers(LEGEND * "#")))
+        self._layout = FixedLayout(MarkerArray, self._template)
+        self._leaves = {leaf.path.removeprefix("markers."): leaf for leaf in self._layout.leaves}
 
     def payloads(
         self, stamps: NDArray[np.int64], configuration: Configuration, twist: Array
@@ -103,35 +108,19 @@ class WristDrawing:
         s_um = 1e6 * np.linalg.norm(exp_twist(twist)[1], axis=1)
         mdeg = 1e3 * np.degrees(np.linalg.norm(twist[:, 3:], axis=1))
         texts = [
-            f"s = {s:.2f} um, phi = {phi:.2f} mdeg, drawn x {factor:g}"
+            f"s = {s:.2f} um, phi = {phi:.2f} mdeg, drawn x {factor:g}".center(LEGEND)[:LEGEND]
             for s, phi in zip(s_um.tolist(), mdeg.tolist(), strict=True)
         ]
-        found = [b""] * n
-        lengths = np.array([len(text) for text in texts])
-        for length in np.unique(lengths).tolist():
-            places = np.flatnonzero(lengths == length)
-            template, layout, leaves = self._template(length)
-            rows = np.tile(np.frombuffer(template, np.uint8), (len(places), 1))
-            for leaf in leaves[STAMPS]:
-                layout.write(rows, leaf, stamps[places])
-            for path, column in numbers.items():
-                layout.write(rows, leaves[path][0], column[places])
-            for place, row in zip(places.tolist(), rows, strict=True):
-                found[place] = row.tobytes().replace(length * b"#", texts[place].encode())
-        return found
-
-    def _template(self, length: int) -> tuple[bytes, FixedLayout[Any], dict[str, list[Leaf]]]:
-        """Return what stays in pictures with a legend of this length, and where their numbers are.
-
-        The numbers of points, and of a pose's place and turn, follow one another.
-        """
-        if length not in self._templates:
-            payload = encode(MarkerArray(self._markers(length * "#")))
-            layout = FixedLayout(MarkerArray, payload)
-            leaves = {leaf.path.removeprefix("markers."): [leaf] for leaf in layout.leaves}
-            leaves[STAMPS] = [leaf for leaf in layout.leaves if leaf.path.endswith(STAMPS)]
-            self._templates[length] = payload, layout, leaves
-        return self._templates[length]
+        rows = np.tile(np.frombuffer(self._template, np.uint8), (n, 1))
+        for path, leaf in self._leaves.items():
+            if path.endswith("header.stamp_ns"):
+                self._layout.write(rows, leaf, stamps)
+        for path, column in numbers.items():
+            self._layout.write(rows, self._leaves[path], column)
+        place = self._template.index(LEGEND * b"#")
+        legends = np.frombuffer("".join(texts).encode(), np.uint8)
+        rows[:, place : place + LEGEND] = legends.reshape(n, LEGEND)
+        return [row.tobytes() for row in rows]
 
     def _markers(self, text: str) -> tuple[Marker, ...]:
         header, geometry, plate = Header(0, self._frame_id), self._geometry, self._geometry.platform

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from wrist_stiffness.commands.modes import ModeSummary
     from wrist_stiffness.commands.output_changes import TopicChanges
     from wrist_stiffness.commands.predict import PosePrediction
-    from wrist_stiffness.commands.replay_summary import ReplaySummary
+    from wrist_stiffness.commands.replay_block import ReplaySummary
 
 
 def prediction_lines(found: PosePrediction, loaded: bool) -> list[str]:
