@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from wrist_stiffness.commands.table_check import check
+from wrist_stiffness.commands.table import check
 from wrist_stiffness.errors import TableError
 from wrist_stiffness.fem import sweep
 from wrist_stiffness.fem.components import elastic_components

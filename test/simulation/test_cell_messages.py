@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.commands.cell_messages import CellMessages
+from wrist_stiffness.commands.simulate import CellMessages
 from wrist_stiffness.recording import RecordingWriter, open_recording, read_samples
 from wrist_stiffness.simulation.cell import SENSED, CellSample
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from wrist_stiffness import topics
-from wrist_stiffness.cli import simulate as command
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.cli.simulate import in_usual_units
+from wrist_stiffness.cli.simulate import simulate as command
 from wrist_stiffness.commands import simulate as workflow
 from wrist_stiffness.commands.simulate import hide, secret, simulate_recording
 from wrist_stiffness.errors import InputError, RecordingError

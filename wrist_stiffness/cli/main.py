@@ -13,31 +13,25 @@ from types import FrameType, ModuleType
 
 from wrist_stiffness import __version__
 from wrist_stiffness.atomic_file import require_room
-from wrist_stiffness.cli import (
-    calibrate,
-    cell,
-    compare,
-    diagnose,
-    explain,
-    export,
-    extend,
-    import_,
-    plan,
-    predict,
-    replay,
-    simulate,
-    table,
-    tolerances,
-    workbench,
-)
+from wrist_stiffness.cli import table
+from wrist_stiffness.cli.csv_tables import export, import_
+from wrist_stiffness.cli.fit import calibrate, extend
+from wrist_stiffness.cli.judge import compare, diagnose
 from wrist_stiffness.cli.parser import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
     EXIT_PIPE_CLOSED,
     PROG,
+    Command,
     OneLineParser,
 )
+from wrist_stiffness.cli.plan import plan
+from wrist_stiffness.cli.pose import explain, predict
 from wrist_stiffness.cli.progress import bars_ended
+from wrist_stiffness.cli.replay import replay
+from wrist_stiffness.cli.simulate import cell, simulate
+from wrist_stiffness.cli.tolerances import tolerances
+from wrist_stiffness.cli.workbench import workbench
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.model.python_laws import python_laws
 
@@ -74,7 +68,7 @@ PLACES = ("output", "record", "diagnosis", *RESULTS)
 """Options that name what is written, or a result that is read: each needs a place of its own."""
 
 
-COMMANDS: tuple[ModuleType, ...] = (
+COMMANDS: tuple[Command | ModuleType, ...] = (
     table,
     predict,
     explain,
@@ -91,11 +85,10 @@ COMMANDS: tuple[ModuleType, ...] = (
     workbench,
     cell,
 )
-"""`add_parser` of each adds its parser and the function to run, which returns an exit code and
-imports what it needs, so that `--help` and the other commands do not wait for it."""
+"""Each function imports what it needs, so that `--help` and the other commands do not wait."""
 
 
-def build_parser(commands: Iterable[ModuleType]) -> OneLineParser:
+def build_parser(commands: Iterable[Command | ModuleType]) -> OneLineParser:
     """Return the parser of commands, listed in their order; its result has a function `run`."""
     parser = OneLineParser(
         prog=PROG,
@@ -116,16 +109,18 @@ def build_parser(commands: Iterable[ModuleType]) -> OneLineParser:
     return parser
 
 
-def main(argv: Sequence[str] | None = None, commands: Iterable[ModuleType] | None = None) -> int:
+def main(
+    argv: Sequence[str] | None = None, commands: Iterable[Command | ModuleType] = COMMANDS
+) -> int:
     """Run one command.
 
     `argv`: arguments without the program name; those of the process if None.  `commands`: the
-    commands on offer; those of the package if None.  Gives 0 done, 1 the answer is no, 2 bad input,
-    130 interrupted, 141 the reader of stdout left.  Raises `SystemExit` from argparse: 0 after
-    `--help` and `--version`, 2 on wrong use; 143 after SIGTERM.
+    commands on offer.  Gives 0 done, 1 the answer is no, 2 bad input, 130 interrupted, 141 the
+    reader of stdout left.  Raises `SystemExit` from argparse: 0 after `--help` and `--version`, 2
+    on wrong use; 143 after SIGTERM.
     """
     _show_every_name()
-    arguments = build_parser(COMMANDS if commands is None else commands).parse_args(argv)
+    arguments = build_parser(commands).parse_args(argv)
     try:
         for option, begins in RESULTS.items():
             _require_place(getattr(arguments, option, None), option, begins)

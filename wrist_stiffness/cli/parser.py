@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import json
 import re
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
@@ -65,29 +67,6 @@ class OneLineParser(argparse.ArgumentParser):
         self.register("type", float, _number)
         self._negative_number_matcher = re.compile(r"-(\d+[.,]?\d*|\.\d+)(e[-+]?\d+)?$", re.I)
 
-    def flag(self, name: str, what: str) -> None:
-        """Add an option without a value."""
-        self.add_argument(name, action="store_true", help=what)
-
-    def option(
-        self, name: str, default: float | int | str, what: str, metavar: str | None = None
-    ) -> None:
-        """Add an option with a value like the default, which its help tells."""
-        shown = f"{default:g}" if isinstance(default, float) else default
-        self.add_argument(
-            name,
-            type=type(default),
-            default=default,
-            metavar=metavar,
-            help=f"{what} (default: {shown})",
-        )
-
-    def repeated(self, name: str, metavar: str, what: str) -> None:
-        """Add an option that may be given several times."""
-        self.add_argument(
-            name, action="append", default=[], metavar=metavar, help=f"{what}; may be repeated"
-        )
-
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
@@ -105,33 +84,88 @@ class OneLineParser(argparse.ArgumentParser):
 
 Commands: TypeAlias = "argparse._SubParsersAction[OneLineParser]"
 
+Option: TypeAlias = Callable[[argparse._ActionsContainer], object]
+"""Adds itself to a parser, or to a group of one."""
 
-def add_command(
-    commands: Commands,
-    name: str,
-    what: str,
-    texts: tuple[str, str],
-    run: Callable[[argparse.Namespace], int],
-    json: bool = True,
-) -> OneLineParser:
-    """Return the parser of a command that is new.
 
-    `name`, `what`: the command, and what it does in a line; `texts`: what its help says before and
-    after the options; `run`: runs it and returns the exit code; `json`: whether it gives its result
-    to programs as well.
+def option(
+    name: str, what: str, metavar: str | tuple[str, ...] | None = None, **settings: Any
+) -> Option:
+    """Return an option or an argument; `settings`: as of `ArgumentParser.add_argument`."""
+    return lambda parser: parser.add_argument(*name.split(), metavar=metavar, help=what, **settings)
+
+
+def flag(name: str, what: str) -> Option:
+    """Return an option without a value."""
+    return lambda parser: parser.add_argument(name, action="store_true", help=what)
+
+
+def value(name: str, default: float | int | str, what: str, metavar: str | None = None) -> Option:
+    """Return an option with a value like the default, which its help tells."""
+    shown = f"{default:g}" if isinstance(default, float) else default
+    told = f"{what} (default: {shown})"
+    return option(name, told, metavar, type=type(default), default=default)
+
+
+def repeated(name: str, metavar: str, what: str) -> Option:
+    """Return an option that may be given several times."""
+    return option(name, f"{what}; may be repeated", metavar, action="append", default=[])
+
+
+def output(metavar: str, what: str, **settings: Any) -> Option:
+    """Return the option that says where to write."""
+    return option("-o --output", what, metavar, **{"required": True, **settings})
+
+
+def one_of(*options: Option, required: bool = False) -> Option:
+    """Return options that exclude each other."""
+    return lambda parser: _add(parser.add_mutually_exclusive_group(required=required), options)
+
+
+def group(title: str, *options: Option) -> Option:
+    """Return options that stand under a title in the help."""
+    return lambda parser: _add(parser.add_argument_group(title), options)
+
+
+def _add(parser: argparse._ActionsContainer, options: Iterable[Option]) -> None:
+    for each in options:
+        each(parser)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: the function that runs it and returns the exit code, and its options.
+
+    The function's docstring is the help: what it does in a line, then what is told before the
+    options, and from `example` on what is told after them.
     """
-    description, epilog = texts
-    parser = commands.add_parser(
-        name,
-        help=what,
-        description=description,
-        epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+
+    run: Callable[[argparse.Namespace], int]
+    options: tuple[Option, ...]
+
+    def add_parser(self, commands: Commands) -> None:
+        """Add the parser of the command."""
+        what, _, text = (inspect.getdoc(self.run) or "").partition("\n\n")
+        description, *epilog = re.split(r"\n\n(?=(?:for )?example)", text, maxsplit=1)
+        parser = commands.add_parser(
+            self.run.__name__.strip("_"),
+            help=what[:1].lower() + what[1:].rstrip("."),
+            description=description,
+            epilog="".join(epilog),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        _add(parser, self.options)
+        parser.set_defaults(run=self.run)
+
+
+def command(
+    *options: Option, json: bool = True
+) -> Callable[[Callable[[argparse.Namespace], int]], Command]:
+    """Make a function a command; `json`: whether it gives its result to programs as well."""
     if json:
-        parser.add_argument("--json", metavar="FILE", help="write the result here as well")
-    parser.set_defaults(run=run)
-    return parser
+        told = option("--json", "write the result here as well", "FILE")
+        options = told, *options
+    return lambda run: Command(run, options)
 
 
 def named_numbers(texts: Iterable[str], option: str) -> dict[str, float]:

@@ -6,42 +6,42 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from wrist_stiffness.cli.options import add_model, add_sensor_names, model_named, settings_named
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command, say
+from wrist_stiffness.cli.options import (
+    MODEL_OPTION,
+    RECORDING,
+    model_named,
+    sensor_names,
+    settings_named,
+)
+from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, command, flag, option, output, say
+from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.errors import InputError
 
-DESCRIPTION = """\
-Run the very code of the nodes over a recording and write it again with predicted pose errors and
-corrected commands added. No ROS graph is needed; the result is the same to the bit every time.
-With --against it also says what changed since an earlier replay of the same recording, after a
-change of the model, the parameters or this program: exit code 1 if anything did."""
 
-EPILOG = """\
-example, a recording with other names:
-  wrist-stiffness replay bag -o bag_predicted \\
-      --topic /load_estimate:=/ft_sensor/wrench --joint wrist_a --joint wrist_b
+@command(
+    RECORDING,
+    output("OUT", "folder or .mcap file"),
+    MODEL_OPTION,
+    *sensor_names("sensor frames, objective, contact policy ..."),
+    flag("--overwrite", "replace an existing OUT"),
+    option("--against", "earlier replay to compare with: what changed?", "OLD_OUT"),
+)
+def replay(arguments: argparse.Namespace) -> int:
+    r"""Predicted errors and corrected commands for a recording.
 
-example, what another model changes:
-  wrist-stiffness replay bag --model old.yaml -o with_old
-  wrist-stiffness replay bag --model new.yaml -o with_new --against with_old"""
+    Run the very code of the nodes over a recording and write it again with predicted pose errors
+    and corrected commands added. No ROS graph is needed; the result is the same to the bit every
+    time. With --against it also says what changed since an earlier replay of the same recording,
+    after a change of the model, the parameters or this program: exit code 1 if anything did.
 
+    example, a recording with other names:
+      wrist-stiffness replay bag -o bag_predicted \
+          --topic /load_estimate:=/ft_sensor/wrench --joint wrist_a --joint wrist_b
 
-def add_parser(commands: Commands) -> None:
-    """Add the parser of `replay`."""
-    what = "predicted errors and corrected commands for a recording"
-    parser = add_command(commands, "replay", what, (DESCRIPTION, EPILOG), _run)
-    parser.add_argument("recording", help="rosbag2 folder with MCAP storage, or a .mcap file")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="folder or .mcap file")
-    add_model(parser, "--model")
-    add_sensor_names(parser, "sensor frames, objective, contact policy ...")
-    parser.flag("--overwrite", "replace an existing OUT")
-    parser.add_argument(
-        "--against", metavar="OLD_OUT", help="earlier replay to compare with: what changed?"
-    )
-
-
-def _run(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.cli.progress import Progress
+    example, what another model changes:
+      wrist-stiffness replay bag --model old.yaml -o with_old
+      wrist-stiffness replay bag --model new.yaml -o with_new --against with_old
+    """
     from wrist_stiffness.commands.output_changes import TopicChanges, output_changes
     from wrist_stiffness.commands.replay import replay
     from wrist_stiffness.recording.reader import open_recording

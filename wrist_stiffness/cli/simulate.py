@@ -1,32 +1,33 @@
-"""`wrist-stiffness simulate`: a recording of the virtual cell, with or without a hidden effect."""
+"""`wrist-stiffness simulate` and `cell`: a virtual cell, recorded or live."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import asdict, replace
 from math import pi
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.cli.options import table_named
-from wrist_stiffness.cli.parser import Commands, add_command, say
+from wrist_stiffness.cli.parser import (
+    EXIT_DONE,
+    EXIT_NO,
+    PROG,
+    command,
+    flag,
+    one_of,
+    option,
+    output,
+    say,
+    value,
+)
+from wrist_stiffness.cli.progress import Progress, Status
 from wrist_stiffness.errors import InputError
 
 if TYPE_CHECKING:
     from wrist_stiffness.lookup.table import Table
     from wrist_stiffness.simulation.cell import CellSettings
-
-DESCRIPTION = """\
-Write a recording of a virtual wrist at work. Its true laws are finer than those of any model; with
---effect or --blind it hides one more. Sizes are in units of one sample's noise."""
-
-EPILOG = """\
-examples:
-  wrist-stiffness simulate -o clean --seconds 120
-  wrist-stiffness simulate -o play --effect joint_clearance@joint_3 --size 3
-  wrist-stiffness simulate -o riddle --blind 7 --seconds 120   # what is it?
-  wrist-stiffness simulate -o judge --blind 7 --seconds 120 --day 2   # the same wrist tomorrow
-  wrist-stiffness simulate --reveal 7 --seconds 120            # the same options open it"""
-
 
 USUAL_SIZE = 3.0
 """Of an effect that is named without one."""
@@ -48,39 +49,57 @@ USUAL_UNITS = {"rad": (180e3 / pi, "mdeg"), "m": (1e6, "um"), "kg": (1e3, "g"), 
 """Factor and name of the units in which models and diagnoses speak, by that of SI."""
 
 
-def add_parser(commands: Commands) -> None:
-    """Add the parser of `simulate`."""
-    what = "write a recording of a virtual cell"
-    parser = add_command(commands, "simulate", what, (DESCRIPTION, EPILOG), _run)
-    parser.add_argument("-o", "--output", metavar="RECORDING", help="rosbag2 folder or .mcap file")
-    parser.add_argument("--table", help="table of the true wrist (default: the shipped one)")
-    parser.option("--seconds", 60.0, "duration")
-    parser.option("--rate", 100.0, "samples per second")
-    parser.option("--seed", 0, "of program and noise")
-    anew = "instrument set up anew, other poses, loads and noise"
-    parser.option("--day", 1, f"another day of the same wrist and effect: {anew}")
-    parser.option("--experiment", "rich", "rich, paper, dead_weights, production or heavy")
-    sensors = "interferometer, tracker, cmm, ideal; a cmm measures once in each rest"
-    parser.option("--instrument", "interferometer", f"pose sensor: {sensors}")
-    seen = "pose, points (position alone) or pointing (rotation alone)"
-    parser.option("--sees", "pose", f"what the pose sensor sees: {seen}")
-    lost = "of its samples, half of them missing and half wild; 0.02 is usual"
-    parser.option("--lost-beams", 0.0, lost, "SHARE")
-    parser.option("--base", "exact", "exact, or wrong as real wrists are")
-    secret = parser.add_mutually_exclusive_group()
-    secret.add_argument(
-        "--effect", metavar="NAME@COMPONENT[:FORM]", help="hide this effect (names: docs)"
-    )
-    secret.add_argument("--blind", type=int, metavar="SEED", help="hide what the seed draws")
-    secret.add_argument("--reveal", type=int, metavar="SEED", help="tell what the seed hid")
-    parser.add_argument(
-        "--size", type=float, help=f"of --effect (default: {USUAL_SIZE:g}); --blind draws its own"
-    )
-    parser.flag("--overwrite", "replace an existing recording")
+@command(
+    output("RECORDING", "rosbag2 folder or .mcap file", required=False),
+    option("--table", "table of the true wrist (default: the shipped one)"),
+    value("--seconds", 60.0, "duration"),
+    value("--rate", 100.0, "samples per second"),
+    value("--seed", 0, "of program and noise"),
+    value(
+        "--day",
+        1,
+        "another day of the same wrist and effect: instrument set up anew, other poses, loads and "
+        "noise",
+    ),
+    value("--experiment", "rich", "rich, paper, dead_weights, production or heavy"),
+    value(
+        "--instrument",
+        "interferometer",
+        "pose sensor: interferometer, tracker, cmm, ideal; a cmm measures once in each rest",
+    ),
+    value(
+        "--sees",
+        "pose",
+        "what the pose sensor sees: pose, points (position alone) or pointing (rotation alone)",
+    ),
+    value(
+        "--lost-beams",
+        0.0,
+        "of its samples, half of them missing and half wild; 0.02 is usual",
+        "SHARE",
+    ),
+    value("--base", "exact", "exact, or wrong as real wrists are"),
+    one_of(
+        option("--effect", "hide this effect (names: docs)", "NAME@COMPONENT[:FORM]"),
+        option("--blind", "hide what the seed draws", "SEED", type=int),
+        option("--reveal", "tell what the seed hid", "SEED", type=int),
+    ),
+    option("--size", f"of --effect (default: {USUAL_SIZE:g}); --blind draws its own", type=float),
+    flag("--overwrite", "replace an existing recording"),
+)
+def simulate(arguments: argparse.Namespace) -> int:
+    """Write a recording of a virtual cell.
 
+    Write a recording of a virtual wrist at work. Its true laws are finer than those of any model;
+    with --effect or --blind it hides one more. Sizes are in units of one sample's noise.
 
-def _run(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.cli.progress import Progress, Status
+    for example:
+      wrist-stiffness simulate -o clean --seconds 120
+      wrist-stiffness simulate -o play --effect joint_clearance@joint_3 --size 3
+      wrist-stiffness simulate -o riddle --blind 7 --seconds 120   # what is it?
+      wrist-stiffness simulate -o judge --blind 7 --seconds 120 --day 2   # the same wrist tomorrow
+      wrist-stiffness simulate --reveal 7 --seconds 120            # the same options open it
+    """
     from wrist_stiffness.commands.simulate import (
         DAY_SEEDS,
         check_bounds,
@@ -146,7 +165,6 @@ def _settings(arguments: argparse.Namespace) -> CellSettings:
 
 
 def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings) -> int:
-    from wrist_stiffness.cli.progress import Status
     from wrist_stiffness.commands.simulate import secret
     from wrist_stiffness.simulation.catalogue import ALL
 
@@ -171,3 +189,41 @@ def in_usual_units(magnitude: float, si: str) -> str:
     head, per, rest = si.partition("/")
     factor, unit = USUAL_UNITS.get(head, (1.0, head))
     return f"{number(factor * magnitude, 4)} {unit}{per}{rest}".removesuffix(" -")
+
+
+@command(
+    option("--model", "model of the nodes and of the cell (default: the shipped one)", type=Path),
+    option("--seconds", "about how long both motions take together", "S", type=float),
+    option("--record", "recording to write: a folder or a .mcap file", "OUT", type=Path),
+    value("--rate", 100.0, "samples per second", "HZ"),
+    value("--seed", 0, "of motion and noise"),
+    json=False,
+)
+def cell(arguments: argparse.Namespace) -> int:
+    """Run the nodes with a virtual wrist.
+
+    Start pose_error_predictor, angle_corrector, model_monitor and a virtual wrist as ROS 2 nodes on
+    this machine. With --seconds the same motion runs twice, first without and then with correction,
+    and the command ends by itself; else the motion goes on until Ctrl-C and
+    'ros2 service call /angle_corrector/enable std_srvs/srv/SetBool "{data: true}"' switches the
+    correction on. Without ROS_DOMAIN_ID in the environment the nodes get a domain of their own.
+    Exit code 1: a node fell silent, or did not end when it was told to; one line says which.
+
+    example:
+      wrist-stiffness cell --seconds 60 --record live
+      wrist-stiffness replay live -o replayed
+    """
+    from wrist_stiffness.commands.cell import run_cell
+
+    sound = run_cell(
+        arguments.model,
+        arguments.seconds,
+        arguments.record,
+        arguments.rate,
+        arguments.seed,
+        Progress("cell"),
+        lambda line: print(f"{PROG}: {line}", file=sys.stderr),
+    )
+    if arguments.record is not None:
+        print(f"written: {arguments.record}")
+    return EXIT_DONE if sound else EXIT_NO

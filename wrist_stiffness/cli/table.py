@@ -7,131 +7,53 @@ from dataclasses import asdict
 from typing import Any
 
 from wrist_stiffness.cli.options import table_named, whole_load
-from wrist_stiffness.cli.parser import EXIT_DONE, EXIT_NO, Commands, add_command, say
+from wrist_stiffness.cli.parser import (
+    EXIT_DONE,
+    EXIT_NO,
+    Commands,
+    command,
+    flag,
+    option,
+    output,
+    say,
+    value,
+)
+from wrist_stiffness.cli.progress import Progress
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015.yaml")
-
-BUILD = """\
-Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over its
-joint space. Mesh, contact rings and grid are refined until the stated error keeps the tolerance, or
-it says what does not. Takes one to three minutes with the default."""
-
-BUILD_EPILOG = """\
-example, a wrist of one's own:
-  wrist-stiffness table build my_wrist.yaml -o my_wrist.npz"""
-
-PART = """\
-Mesh a link drawn in CAD and print its 6 x 6 stiffness, to be put under that link in a geometry
-file. The STEP file holds one solid in mm, in the base frame with the wrist at home and O at the
-origin; its faces motor_bore and platform_bore are held."""
-
-PART_EPILOG = """\
-example, a forked link_1:
-  wrist-stiffness table part fork.step --link link_1 --geometry my_wrist.yaml"""
-
-CHECK = """\
-Verify a table: complete and undamaged, compliance positive definite, splines as good as stated.
-With --rebuild the whole sweep runs again from the geometry in the table and all numbers are
-compared. The exit code is 1 if a check fails."""
-
-CHECK_EPILOG = """\
-example, is this still the table of that geometry?
-  wrist-stiffness table check my_wrist.npz --geometry my_wrist.yaml"""
-
-SHOW = """\
-Say what a table holds and draw what a load does: maps of the platform's displacement and
-orientation error over both motor angles with the border of the operative workspace, the error
-budget (whose share is it?) and the bent wrist. The default is the rated load, 1 N downward.
-With --modes it draws natural frequencies and mode shapes instead."""
-
-SHOW_EPILOG = """\
-example, 2 N along y at a point of the platform's plate:
-  wrist-stiffness table show -o maps --load 0 2 0 --at 20 0 -18
-
-example, natural frequencies with a gripper of 0.2 kg, 30 mm below O:
-  wrist-stiffness table show -o maps --modes --payload 0.2 0 0 -30"""
+TABLE = option("table", "table file (default: the shipped one)", nargs="?")
 
 
-def add_parser(commands: Commands) -> None:
-    """Add the parsers of the table commands."""
-    parser = commands.add_parser("table", help="build, check or show a lookup table")
-    actions = parser.add_subparsers(metavar="ACTION", required=True)
-
-    what = "run the finite-element sweep"
-    build = add_command(actions, "build", what, (BUILD, BUILD_EPILOG), _build)
-    build.add_argument("geometry", nargs="?", help="geometry file (default: the shipped wrist's)")
-    build.add_argument("-o", "--output", required=True, metavar="TABLE", help="ends in .npz")
-    build.option("--tolerance", 0.025, "largest error of s and phi to be stated", "FRACTION")
-    build.add_argument(
-        "--grid", type=int, metavar="N", help="fixed N x N grid; 5 gives the paper's 25 poses"
-    )
-    build.add_argument(
+@command(
+    option("geometry", "geometry file (default: the shipped wrist's)", nargs="?"),
+    output("TABLE", "ends in .npz"),
+    value("--tolerance", 0.025, "largest error of s and phi to be stated", "FRACTION"),
+    option("--grid", "fixed N x N grid; 5 gives the paper's 25 poses", "N", type=int),
+    option(
         "--interface",
+        "how a pin or hub holds a wall: every point, in the mean, or a bushing's by pressure "
+        "alone (default: rigid)",
         choices=("rigid", "distributing", "sliding"),
         default="rigid",
-        help="how a pin or hub holds a wall: every point, in the mean, or a bushing's by pressure "
-        "alone (default: rigid)",
-    )
-    build.add_argument(
+    ),
+    option(
         "--evaluation",
+        "what the nodes use (default: closed_form)",
         choices=("closed_form", "spline"),
         default="closed_form",
-        help="what the nodes use (default: closed_form)",
-    )
+    ),
+)
+def build(arguments: argparse.Namespace) -> int:
+    """Run the finite-element sweep.
 
-    what = "stiffness of a link drawn in CAD"
-    part = add_command(actions, "part", what, (PART, PART_EPILOG), _part)
-    part.add_argument("step", help="STEP file")
-    links = ("link_1", "link_2", "link_3")
-    part.add_argument("--link", required=True, choices=links, help="the link that it draws")
-    part.add_argument("--geometry", metavar="FILE", help="of its wrist (default: the shipped one)")
+    Condense the links and bushings of a geometry by solid finite elements and sweep the wrist over
+    its joint space. Mesh, contact rings and grid are refined until the stated error keeps the
+    tolerance, or it says what does not. Takes one to three minutes with the default.
 
-    check = add_command(actions, "check", "verify a table", (CHECK, CHECK_EPILOG), _check)
-    check.add_argument("table", nargs="?", help="table file (default: the shipped one)")
-    check.add_argument("--geometry", metavar="FILE", help="must be the geometry of the table")
-    check.flag("--rebuild", "compute it again and compare")
-
-    what = "draw its maps and error budget"
-    show = add_command(actions, "show", what, (SHOW, SHOW_EPILOG), _show)
-    show.add_argument("table", nargs="?", help="table file (default: the shipped one)")
-    show.add_argument(
-        "-o", "--output", default=".", metavar="FOLDER", help="for the PNG files (default: here)"
-    )
-    show.add_argument(
-        "--load",
-        nargs="+",
-        type=float,
-        metavar="N",
-        help="force [N], or force [N] and moment [N m], in wrist_base (default: the rated load)",
-    )
-    show.add_argument(
-        "--at",
-        nargs=3,
-        type=float,
-        default=(0.0, 0.0, 0.0),
-        metavar="MM",
-        help="where --load acts, in wrist_platform [mm] (default: O)",
-    )
-    show.flag("--modes", "natural frequencies and mode shapes")
-    show.add_argument(
-        "--payload",
-        nargs=4,
-        type=float,
-        metavar=("KG", "X", "Y", "Z"),
-        help="for --modes: mass [kg] and centre of gravity in wrist_platform [mm] (default: none)",
-    )
-    show.add_argument(
-        "--payload-inertia",
-        nargs=3,
-        type=float,
-        metavar=("IXX", "IYY", "IZZ"),
-        help="of the payload about its centre of gravity [kg mm^2] (default: a point)",
-    )
-
-
-def _build(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.cli.progress import Progress
+    example, a wrist of one's own:
+      wrist-stiffness table build my_wrist.yaml -o my_wrist.npz
+    """
     from wrist_stiffness.commands import table
     from wrist_stiffness.report.terminal import fact_lines
 
@@ -158,7 +80,23 @@ def _build(arguments: argparse.Namespace) -> int:
     return say(arguments, [*lines, written], values)
 
 
-def _part(arguments: argparse.Namespace) -> int:
+@command(
+    option("step", "STEP file"),
+    option(
+        "--link", "the link that it draws", required=True, choices=("link_1", "link_2", "link_3")
+    ),
+    option("--geometry", "of its wrist (default: the shipped one)", "FILE"),
+)
+def part(arguments: argparse.Namespace) -> int:
+    """Stiffness of a link drawn in CAD.
+
+    Mesh a link drawn in CAD and print its 6 x 6 stiffness, to be put under that link in a geometry
+    file. The STEP file holds one solid in mm, in the base frame with the wrist at home and O at the
+    origin; its faces motor_bore and platform_bore are held.
+
+    example, a forked link_1:
+      wrist-stiffness table part fork.step --link link_1 --geometry my_wrist.yaml
+    """
     from wrist_stiffness.commands.table import part
 
     found = part(arguments.step, arguments.geometry or SHIPPED, arguments.link)
@@ -174,9 +112,22 @@ def _part(arguments: argparse.Namespace) -> int:
     return say(arguments, lines, {"stiffness": {"matrix_N_mm": matrix}})
 
 
-def _check(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.cli.progress import Progress
-    from wrist_stiffness.commands.table_check import check
+@command(
+    TABLE,
+    option("--geometry", "must be the geometry of the table", "FILE"),
+    flag("--rebuild", "compute it again and compare"),
+)
+def check(arguments: argparse.Namespace) -> int:
+    """Verify a table.
+
+    Verify a table: complete and undamaged, compliance positive definite, splines as good as stated.
+    With --rebuild the whole sweep runs again from the geometry in the table and all numbers are
+    compared. The exit code is 1 if a check fails.
+
+    example, is this still the table of that geometry?
+      wrist-stiffness table check my_wrist.npz --geometry my_wrist.yaml
+    """
+    from wrist_stiffness.commands.table import check
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
     findings = check(path, arguments.geometry, arguments.rebuild, Progress("rebuild"))
@@ -188,7 +139,54 @@ def _check(arguments: argparse.Namespace) -> int:
     return EXIT_DONE if passed else EXIT_NO
 
 
-def _show(arguments: argparse.Namespace) -> int:
+@command(
+    TABLE,
+    output("FOLDER", "for the PNG files (default: here)", required=False, default="."),
+    option(
+        "--load",
+        "force [N], or force [N] and moment [N m], in wrist_base (default: the rated load)",
+        "N",
+        nargs="+",
+        type=float,
+    ),
+    option(
+        "--at",
+        "where --load acts, in wrist_platform [mm] (default: O)",
+        "MM",
+        nargs=3,
+        type=float,
+        default=(0.0, 0.0, 0.0),
+    ),
+    flag("--modes", "natural frequencies and mode shapes"),
+    option(
+        "--payload",
+        "for --modes: mass [kg] and centre of gravity in wrist_platform [mm] (default: none)",
+        ("KG", "X", "Y", "Z"),
+        nargs=4,
+        type=float,
+    ),
+    option(
+        "--payload-inertia",
+        "of the payload about its centre of gravity [kg mm^2] (default: a point)",
+        ("IXX", "IYY", "IZZ"),
+        nargs=3,
+        type=float,
+    ),
+)
+def show(arguments: argparse.Namespace) -> int:
+    """Draw its maps and error budget.
+
+    Say what a table holds and draw what a load does: maps of the platform's displacement and
+    orientation error over both motor angles with the border of the operative workspace, the error
+    budget (whose share is it?) and the bent wrist. The default is the rated load, 1 N downward.
+    With --modes it draws natural frequencies and mode shapes instead.
+
+    example, 2 N along y at a point of the platform's plate:
+      wrist-stiffness table show -o maps --load 0 2 0 --at 20 0 -18
+
+    example, natural frequencies with a gripper of 0.2 kg, 30 mm below O:
+      wrist-stiffness table show -o maps --modes --payload 0.2 0 0 -30
+    """
     from wrist_stiffness.commands import modes, table
     from wrist_stiffness.commands.budget import Push
     from wrist_stiffness.report.pictures.table import draw_maps, draw_modes
@@ -211,3 +209,11 @@ def _show(arguments: argparse.Namespace) -> int:
         lines = [*fact_lines(shown), *load_lines(values)]
     lines += [f"written: {picture}" for picture in pictures]
     return say(arguments, lines, values)
+
+
+def add_parser(commands: Commands) -> None:
+    """Add the parsers of the table commands."""
+    parser = commands.add_parser("table", help="build, check or show a lookup table")
+    actions = parser.add_subparsers(metavar="ACTION", required=True)
+    for each in (build, part, check, show):
+        each.add_parser(actions)

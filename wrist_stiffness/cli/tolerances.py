@@ -5,42 +5,38 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wrist_stiffness.cli.options import add_load, add_model, model_named, whole_load
-from wrist_stiffness.cli.parser import Commands, add_command, named_numbers, say
-
-DESCRIPTION = """\
-Say which tolerance costs how many um.  Virtual wrists are built, every axis, gap and part drawn
-within its tolerance; the table tells what each tolerance adds to the error that the nominal model
-does not know, RMS over wrists and over poses of the operative workspace.  Flanges are shimmed to
-the axes, as a fitter does."""
-
-EPILOG = """\
-examples:
-  wrist-stiffness tolerances --load 0 0 -1
-  wrist-stiffness tolerances my_wrist.yaml --wrists 10000 --picture costs.png
-  wrist-stiffness tolerances --limit bushing_stiffness.flexibility_percent=10
-  wrist-stiffness tolerances --limit axis_misalignment@joint_2.shift_u_um=5"""
+from wrist_stiffness.cli.options import LOAD, MODEL, model_named, whole_load
+from wrist_stiffness.cli.parser import command, named_numbers, option, repeated, say, value
+from wrist_stiffness.cli.progress import Progress
 
 
-def add_parser(commands: Commands) -> None:
-    """Add the parser of `tolerances`."""
-    what = "which tolerance costs how many um"
-    parser = add_command(commands, "tolerances", what, (DESCRIPTION, EPILOG), _run)
-    add_model(parser)
-    parser.option("--wrists", 1000, "how many are built")
-    add_load(parser)
-    parser.repeated(
+@command(
+    MODEL,
+    value("--wrists", 1000, "how many are built"),
+    LOAD,
+    repeated(
         "--limit",
         "NAME=NUMBER",
         "another tolerance, LAW.PARAMETER or LAW@PLACE.PARAMETER, to each side; of a gap its "
         "standard deviation; 0 for none",
-    )
-    parser.option("--seed", 0, "of the draws")
-    parser.add_argument("--picture", metavar="OUT.png", help="draw the table here")
+    ),
+    value("--seed", 0, "of the draws"),
+    option("--picture", "draw the table here", "OUT.png"),
+)
+def tolerances(arguments: argparse.Namespace) -> int:
+    """Which tolerance costs how many um.
 
+    Say which tolerance costs how many um.  Virtual wrists are built, every axis, gap and part drawn
+    within its tolerance; the table tells what each tolerance adds to the error that the nominal
+    model does not know, RMS over wrists and over poses of the operative workspace.  Flanges are
+    shimmed to the axes, as a fitter does.
 
-def _run(arguments: argparse.Namespace) -> int:
-    from wrist_stiffness.cli.progress import Progress
+    for example:
+      wrist-stiffness tolerances --load 0 0 -1
+      wrist-stiffness tolerances my_wrist.yaml --wrists 10000 --picture costs.png
+      wrist-stiffness tolerances --limit bushing_stiffness.flexibility_percent=10
+      wrist-stiffness tolerances --limit axis_misalignment@joint_2.shift_u_um=5
+    """
     from wrist_stiffness.commands.tolerances import study_tolerances
 
     study = study_tolerances(

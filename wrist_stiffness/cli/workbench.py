@@ -4,33 +4,33 @@ from __future__ import annotations
 
 import argparse
 
-from wrist_stiffness.cli.parser import EXIT_DONE, Commands, add_command
-
-DESCRIPTION = """\
-Open a page on this machine: drop a recording, see where the error is, which effect is missing and
-what it would explain, add it and watch the error fall.  Nothing leaves the machine; the page reads
-and writes in its workspace folder only."""
-
-EPILOG = """\
-examples:
-  wrist-stiffness workbench
-  wrist-stiffness workbench --folder my_wrist --port 8123 --no-browser
-  wrist-stiffness workbench --host 0.0.0.0     other machines too; the address has a token"""
+from wrist_stiffness.cli.parser import EXIT_DONE, command, flag, value
 
 
-def add_parser(commands: Commands) -> None:
-    """Add the parser of `workbench`."""
-    what = "the same in the browser, on this machine"
-    parser = add_command(commands, "workbench", what, (DESCRIPTION, EPILOG), _run, json=False)
-    where = "workspace: recordings and models that the page offers, and what it writes"
-    parser.option("--folder", "workbench", where)
-    parser.option("--host", "127.0.0.1", "address")
-    parser.option("--port", 8080, "port")
-    parser.option("--largest-upload", 1024, "largest file that the page takes", "MB")
-    parser.flag("--no-browser", "only print the address")
+@command(
+    value(
+        "--folder",
+        "workbench",
+        "workspace: recordings and models that the page offers, and what it writes",
+    ),
+    value("--host", "127.0.0.1", "address"),
+    value("--port", 8080, "port"),
+    value("--largest-upload", 1024, "largest file that the page takes", "MB"),
+    flag("--no-browser", "only print the address"),
+    json=False,
+)
+def workbench(arguments: argparse.Namespace) -> int:
+    """Do the same in the browser, on this machine.
 
+    Open a page on this machine: drop a recording, see where the error is, which effect is missing
+    and what it would explain, add it and watch the error fall.  Nothing leaves the machine; the
+    page reads and writes in its workspace folder only.
 
-def _run(arguments: argparse.Namespace) -> int:
+    for example:
+      wrist-stiffness workbench
+      wrist-stiffness workbench --folder my_wrist --port 8123 --no-browser
+      wrist-stiffness workbench --host 0.0.0.0     other machines too; the address has a token
+    """
     from wrist_stiffness.web.server import serve
 
     serve(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from wrist_stiffness.atomic_file import require_room
-from wrist_stiffness.commands.fit_values import fit_values, parameter_values
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
 from wrist_stiffness.comparing.compare import doubts_load, suspicion_in, wrong_load
@@ -15,6 +15,7 @@ from wrist_stiffness.comparing.wiring import told_mistake
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate
 from wrist_stiffness.identification.free_effects import unfitted
+from wrist_stiffness.identification.result import Fit, FittedParameter
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -88,3 +89,49 @@ def writable(output: str | Path) -> Path:
         raise InputError(f"{output}: a model is no recording; choose another name")
     require_room(output)
     return output
+
+
+def fit_values(
+    fit: Fit,
+    before: Mapping[str, float],
+    after: Mapping[str, float],
+    judged_by: str,
+    sessions: Iterable[MeasuredSession],
+) -> dict[str, Any]:
+    """Return errors (RMS by the key of the quantity) and of what they are."""
+    return {
+        "schema": 2,
+        "noise": dict(fit.noise),
+        "discrepancy": dict(fit.discrepancy),
+        "before": {f"rmse_{key}": value for key, value in before.items()},
+        "after": {f"rmse_{key}": value for key, value in after.items()},
+        "judged_by": judged_by,
+        "sessions": [
+            {"name": session.name, "remarks": list(session.remarks)} for session in sessions
+        ],
+        "lost": fit.lost,
+        "settled": fit.arrived,
+    }
+
+
+def parameter_values(parameters: Iterable[FittedParameter]) -> list[dict[str, Any]]:
+    """Return all parameters for programs."""
+    values = []
+    for each in parameters:
+        effect, _, component = each.effect.partition("@")
+        values.append(
+            {
+                "effect": effect,
+                "component": component,
+                "session": each.session,
+                "parameter": each.key,
+                "value": each.value,
+                "sigma": each.sigma,
+                "prior": each.prior,
+                "prior_sigma": each.prior_sigma,
+                "excited": each.excited,
+                "at_bound": each.at_bound,
+                "together_with": list(each.together),
+            }
+        )
+    return values

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from types import FrameType
-from typing import NoReturn
 
 from wrist_stiffness import topics
 from wrist_stiffness.commands.node_list import (
@@ -167,8 +164,6 @@ def _processes(
         PARENT_PID: str(os.getpid()),
     }
     running: dict[str, subprocess.Popen[bytes]] = {}
-    # By itself SIGTERM would end this process without the `finally`, and leave the nodes behind.
-    previous = signal.signal(signal.SIGTERM, _leave)
     try:
         for node in nodes:
             # In a session of their own: an interrupt reaches them once, from here.
@@ -181,7 +176,6 @@ def _processes(
             ending = {n: each for n, each in running.items() if (n == RECORDER_NODE.name) is last}
             for name in _end(ending):
                 tell_killed(name)
-        signal.signal(signal.SIGTERM, previous)
 
 
 def _end(processes: Mapping[str, subprocess.Popen[bytes]]) -> list[str]:
@@ -198,7 +192,3 @@ def _end(processes: Mapping[str, subprocess.Popen[bytes]]) -> list[str]:
             process.wait()
             killed.append(name)
     return killed
-
-
-def _leave(number: int, frame: FrameType | None) -> NoReturn:
-    raise SystemExit(128 + number)

@@ -75,11 +75,7 @@ class Compared:
         values = self.comparison.as_values()
         for model, own in zip(self.comparison.models, values["models"], strict=True):
             own["worst_poses"] = [pose.as_values() for pose in self.worst(model)]
-        return {
-            **values,
-            "notes": list(self.notes),
-            "provenance": self.provenance.as_values(),
-        }
+        return {**values, "notes": list(self.notes), "provenance": self.provenance.as_values()}
 
 
 def compare(

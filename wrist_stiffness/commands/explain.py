@@ -188,11 +188,7 @@ def measured_twist(pose: Sequence[float], platform: Array) -> Array:
 
 
 def _explained(
-    parts: Budget,
-    total: Array,
-    measured: bool,
-    meanings: Mapping[str, str],
-    notes: Sequence[str],
+    parts: Budget, total: Array, measured: bool, meanings: Mapping[str, str], notes: Sequence[str]
 ) -> Explanation:
     directions = _directions(total)
 

@@ -186,11 +186,7 @@ def _is_identity(turn: Array, origin: Array) -> bool:
 
 
 def _write(
-    output: Path,
-    columns: Columns,
-    time_ns: Stamps,
-    values: Mapping[str, Array],
-    progress: Progress,
+    output: Path, columns: Columns, time_ns: Stamps, values: Mapping[str, Array], progress: Progress
 ) -> None:
     names = columns.names[1:]
     writers = [writer_of(name) for name in names]

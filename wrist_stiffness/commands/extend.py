@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrist_stiffness.commands.calibrate import writable
-from wrist_stiffness.commands.fit_values import fit_values, parameter_values
+from wrist_stiffness.commands.calibrate import fit_values, parameter_values, writable
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
 from wrist_stiffness.errors import InputError

@@ -25,7 +25,7 @@ from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import WristError
@@ -67,27 +67,19 @@ def table_values(rows: Sequence[Row], what: str) -> dict[str, Any]:
     }
 
 
-class Told(Protocol):
-    """What a command returns."""
-
-    def as_values(self) -> dict[str, Any]:
-        """Return what programs read."""
-
-
 def each_recording(
-    command: Callable[[Recordings], Told], recordings: Recordings, progress: Progress
+    command: Callable[[Recordings], Any], recordings: Recordings, progress: Progress
 ) -> list[Row]:
     """Run a command on every recording by itself, as of a wrist of its own, in parallel.
 
-    `command`: of recordings; can be pickled.  Raises `InputError` if there is no recording.
+    `command`: of recordings, its answer has `as_values`; can be pickled.  Raises `InputError` if
+    there is no recording.
     """
     one = partial(_values, command=command, recordings=recordings)
     return spread(one, recordings_in(recordings.paths), progress=progress)
 
 
-def _values(
-    path: Path, command: Callable[[Recordings], Told], recordings: Recordings
-) -> dict[str, Any]:
+def _values(path: Path, command: Callable[[Recordings], Any], recordings: Recordings) -> Any:
     return command(replace(recordings, paths=[path])).as_values()
 
 

@@ -19,23 +19,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
-from wrist_stiffness.recording.messages import (
-    Float64,
-    Header,
-    JointState,
-    Message,
-    Point,
-    Pose,
-    PoseArray,
-    PoseWithCovariance,
-    PoseWithCovarianceStamped,
-    Quaternion,
-    String,
-    Temperature,
-    Vector3,
-    Wrench,
-    WrenchStamped,
-)
+from wrist_stiffness.recording import messages as msg
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
 from wrist_stiffness.sessions.gauges import gauge_of, read_gauges
 from wrist_stiffness.sessions.reading.csv_columns import (
@@ -128,7 +112,7 @@ def import_csv(
                     facts[GAUGES] = [each.note for each in gauges.values()]
                 if unloaded:
                     facts["load_source"] = "constant"
-                note = String(json.dumps(facts, sort_keys=True))
+                note = msg.String(json.dumps(facts, sort_keys=True))
                 first_ns = zero_ns + row.time_ns
                 writer.write(topics.RECORDING_NOTES, note, first_ns)
             stamp_ns = zero_ns + row.time_ns
@@ -323,40 +307,40 @@ def _zero(time_ns: int) -> int:
 
 def _messages(
     row: _Row, columns: Columns, stamp_ns: int, frame: str
-) -> Iterator[tuple[str, Message]]:
+) -> Iterator[tuple[str, msg.Message]]:
     """Give the messages of a row; the load goes first, so that it has arrived with its angles."""
-    header = Header(stamp_ns, BASE_FRAME)
+    header = msg.Header(stamp_ns, BASE_FRAME)
     load = row.of(LOAD) if columns.loads else [0.0] * 6
-    wrench = Wrench(Vector3(*load[:3]), Vector3(*load[3:]))
-    yield topics.LOAD_ESTIMATE, WrenchStamped(header, wrench)
+    wrench = msg.Wrench(msg.Vector3(*load[:3]), msg.Vector3(*load[3:]))
+    yield topics.LOAD_ESTIMATE, msg.WrenchStamped(header, wrench)
     for component, name in columns.temperatures.items():
         if name in row.values:
-            message = Temperature(Header(stamp_ns, component), row.values[name])
+            message = msg.Temperature(msg.Header(stamp_ns, component), row.values[name])
             yield topics.TEMPERATURES, message
     for covariate, name in columns.covariates.items():
         if name in row.values:
-            yield topics.COVARIATES + covariate, Float64(row.values[name])
-    motors = Header(stamp_ns, "")
-    yield topics.JOINT_STATES, JointState(motors, DEFAULT_JOINTS, tuple(row.of(MOTORS)))
+            yield topics.COVARIATES + covariate, msg.Float64(row.values[name])
+    motors = msg.Header(stamp_ns, "")
+    yield topics.JOINT_STATES, msg.JointState(motors, DEFAULT_JOINTS, tuple(row.of(MOTORS)))
     if columns.gauges:
         names = tuple(map(gauge_of, columns.gauges))
-        yield topics.GAUGE_READINGS, JointState(motors, names, tuple(row.of(columns.gauges)))
+        yield topics.GAUGE_READINGS, msg.JointState(motors, names, tuple(row.of(columns.gauges)))
     elif columns.markers:
         points = np.reshape(row.of(marker_columns(columns.markers)), (-1, 3))
-        poses = tuple(Pose(Point(*point)) for point in points.tolist())
-        yield topics.PLATFORM_MARKERS, PoseArray(Header(stamp_ns, frame), poses)
+        poses = tuple(msg.Pose(msg.Point(*point)) for point in points.tolist())
+        yield topics.PLATFORM_MARKERS, msg.PoseArray(msg.Header(stamp_ns, frame), poses)
     else:
-        pose = PoseWithCovarianceStamped(Header(stamp_ns, frame), _pose(row))
+        pose = msg.PoseWithCovarianceStamped(msg.Header(stamp_ns, frame), _pose(row))
         yield topics.PLATFORM_POSE, pose
 
 
-def _pose(row: _Row) -> PoseWithCovariance:
+def _pose(row: _Row) -> msg.PoseWithCovariance:
     """Return the pose of a row; what is blank has a huge variance, what is not an unknown one."""
     position, quaternion = row.of(POSITION), row.of(QUATERNION)
     turned = not np.isnan(quaternion).any()
     known = np.append(np.isfinite(position), [turned] * 3)
-    pose = Pose(
-        Point(*np.where(known[:3], position, 0.0).tolist()),
-        Quaternion(*quaternion) if turned else Quaternion(),
+    pose = msg.Pose(
+        msg.Point(*np.where(known[:3], position, 0.0).tolist()),
+        msg.Quaternion(*quaternion) if turned else msg.Quaternion(),
     )
-    return PoseWithCovariance(pose, tuple(np.diag(np.where(known, 0.0, HUGE)).ravel().tolist()))
+    return msg.PoseWithCovariance(pose, tuple(np.diag(np.where(known, 0.0, HUGE)).ravel().tolist()))

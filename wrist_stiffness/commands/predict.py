@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,46 +17,14 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.simulation.exact import ExactWrist
 
 
-@dataclass(frozen=True)
-class PosePrediction:
-    """Prediction at one pose, and what is worth knowing about it."""
-
-    prediction: Prediction
-    evaluation: Evaluation  # how the nodes evaluate the table
-    other: Prediction | None  # by the other evaluation, where it was asked for
-    # (6,), twist with finite rotations [m, rad], where the first order in which the prediction is
-    # made has been left and the model has no effects
-    exact: Array | None
-    # part of the load's strain energy in each component with free slides; they add up to 1
-    energy_shares: dict[str, float]
-    tilt: float  # of the platform's normal from home [rad]
-    singularity: float  # D at the pose
-    operative: bool  # whether the pose lies in the operative workspace
-
-    def as_values(self) -> dict[str, Any]:
-        """Return what people and programs read, with units in the names."""
-        return {
-            **_values(self.prediction),
-            "evaluation": self.evaluation,
-            "other_evaluation": None if self.other is None else _values(self.other),
-            "exact": None if self.exact is None else _lengths(self.exact),
-            "past_first_order": past_first_order(self.prediction),
-            "energy_share": self.energy_shares,
-            "tilt_deg": float(np.degrees(self.tilt)),
-            "singularity_D": self.singularity,
-            "in_operative_workspace": self.operative,
-            "sectors_in_contact": int(np.count_nonzero(self.prediction.active)),
-        }
-
-
 def predict(
     model: str | Path,
     angles: Sequence[float],
     load: Sequence[float],
     on_platform: bool,
     both: bool = False,
-) -> PosePrediction:
-    """Predict the pose error at one pose under one load.
+) -> dict[str, Any]:
+    """Predict the pose error at one pose under one load, as people and programs read it.
 
     `angles`: motor angles [rad]; `load`: wrench on the platform at O [N, N m]; `on_platform`:
     whether it is given in `wrist_platform` instead of `wrist_base`; `both`: also evaluate the table
@@ -70,28 +37,27 @@ def predict(
     other = None
     if both:
         way: Evaluation = "spline" if error_model.evaluation == "closed_form" else "closed_form"
-        other = error_model.with_evaluation(way).predict(theta, wrench)
+        other = _values(error_model.with_evaluation(way).predict(theta, wrench))
     table = error_model.table
     configuration = prediction.configuration
+    past_first_order = prediction.phi > FIRST_ORDER_LIMIT
     exact = None
-    if past_first_order(prediction) and not error_model.effects:
+    if past_first_order and not error_model.effects:
+        # With finite rotations; of effects only the first order is known.
         state = ExactWrist(table, ()).solve(theta, wrench.in_base(configuration))
-        exact = log_motion(state.rotation @ configuration.platform.T, state.shift)
-    return PosePrediction(
-        prediction=prediction,
-        evaluation=error_model.evaluation,
-        other=other,
-        exact=exact,
-        energy_shares=_shares(table.shares(configuration), wrench.in_base(configuration)),
-        tilt=float(table.mechanism.tilt(theta)),
-        singularity=float(configuration.singularity),
-        operative=bool(table.workspace.operative(theta)),
-    )
-
-
-def past_first_order(prediction: Prediction) -> bool:
-    """Whether the platform turns by more than first order holds for."""
-    return prediction.phi > FIRST_ORDER_LIMIT
+        exact = _lengths(log_motion(state.rotation @ configuration.platform.T, state.shift))
+    return {
+        **_values(prediction),
+        "evaluation": error_model.evaluation,
+        "other_evaluation": other,
+        "exact": exact,
+        "past_first_order": past_first_order,
+        "energy_share": _shares(table.shares(configuration), wrench.in_base(configuration)),
+        "tilt_deg": float(np.degrees(table.mechanism.tilt(theta))),
+        "singularity_D": float(configuration.singularity),
+        "in_operative_workspace": bool(table.workspace.operative(theta)),
+        "sectors_in_contact": int(np.count_nonzero(prediction.active)),
+    }
 
 
 def _lengths(twist: Array) -> dict[str, float]:
@@ -103,6 +69,7 @@ def _lengths(twist: Array) -> dict[str, float]:
 
 
 def _shares(shares: Array, wrench: Array) -> dict[str, float]:
+    """Return the part of the load's strain energy in each component, slides free; 0 for no load."""
     energy = np.einsum("i,kij,j->k", wrench, shares, wrench)
     total = energy.sum()
     return {

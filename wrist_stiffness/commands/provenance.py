@@ -5,17 +5,17 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import scipy
 
 from wrist_stiffness import __version__
 from wrist_stiffness.commands.read_sessions import measured_sha256, sha256_by_name
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import file_sha256
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-
-PACKAGES = ("numpy", "scipy")
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,12 @@ class Provenance:
     @property
     def versions(self) -> dict[str, str]:
         """Versions of this package, of Python and of the libraries that compute."""
-        found = {"wrist_stiffness": __version__, "python": platform.python_version()}
-        for package in PACKAGES:
-            try:
-                found[package] = version(package)
-            except PackageNotFoundError:
-                found[package] = "unknown"
-        return found
+        return {
+            "wrist_stiffness": __version__,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+        }
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read."""

@@ -1,8 +1,8 @@
-"""Build and show a lookup table."""
+"""Build, verify and show a lookup table."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,11 @@ import numpy as np
 from wrist_stiffness.commands.uncertainty import with_second_order
 from wrist_stiffness.errors import GeometryError, InputError
 from wrist_stiffness.inputs.document import read_yaml
+from wrist_stiffness.lookup.operators import column_sizes
 from wrist_stiffness.lookup.table import MAP_COLUMNS, Evaluation, Table
-from wrist_stiffness.lookup.table_file import save_table
+from wrist_stiffness.lookup.table_file import load_table, save_table
+from wrist_stiffness.lookup.verification import COVERED, HALVES, spline_misses, unseen_poses
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.fits import check_fits
 from wrist_stiffness.mechanism.geometry_file import geometry_of, load_geometry
 from wrist_stiffness.mechanism.own_stiffness import in_millimetres
@@ -27,6 +30,12 @@ MIN_PER_AXIS, MAX_PER_AXIS = 3, 61
 
 FINE = 161
 """Points along each motor angle where the rated load's map is summarised and drawn."""
+
+STATED_ROUNDING = 1e-7
+"""Rounding of an interpolation error: 1e-16 times the condition number of the spline's system."""
+
+REBUILT_TOLERANCE = 1e-6
+"""Relative difference of a rebuilt table that counts as the same: other BLAS, same mesh."""
 
 
 def build(
@@ -113,12 +122,110 @@ def summarise(table: Table) -> dict[str, dict[str, Any]]:
     inside = values[workspace.operative(poses)]
     names = [f"{name}_um" for name in MAP_COLUMNS[:4]] + ["phi_mdeg"]
     operative = {
-        name: {
-            "mean": float(column.mean()),
-            "min": float(column.min()),
-            "max": float(column.max()),
-        }
+        name: {"mean": float(column.mean()), "min": float(column.min()), "max": float(column.max())}
         for name, column in zip(names, inside.T, strict=True)
     }
     domain = {name: float(column.max()) for name, column in zip(names, values.T, strict=True)}
     return {"operative": operative, "domain_max": domain}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a check looked at."""
+
+    # `name`, `text`: what was checked and what was found, with the limit
+    name: str
+    text: str
+    passed: bool
+
+
+def check(
+    path: str | Path,
+    geometry: str | Path | None = None,
+    rebuild: bool = False,
+    progress: Progress = silent,
+) -> list[Finding]:
+    """Verify a table: all checks; the table is good if all passed.
+
+    `geometry`: file that the table must be of; `rebuild`: also condense the parts and sweep again,
+    and compare all numbers.  Raises `TableError` or `GeometryError` if a file cannot be read at
+    all.
+    """
+    table = load_table(path)
+    findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]
+    if geometry is not None:
+        wanted = load_geometry(geometry).sha256
+        same = wanted == table.geometry.sha256
+        findings.append(
+            Finding(
+                "geometry",
+                f"made for {table.geometry.sha256[:12]}, {geometry} is {wanted[:12]}",
+                same,
+            )
+        )
+    findings.append(_definiteness(table))
+    misses, operative = spline_misses(table, np.random.default_rng())
+    for region, rows in (("operative", misses[operative]), ("domain", misses)):
+        for column, name in enumerate(HALVES):
+            stated = table.header.errors["predicted"][region][name]
+            covered = float(np.mean(rows[:, column] <= stated + STATED_ROUNDING))
+            findings.append(
+                Finding(
+                    f"spline {name} {region}",
+                    f"within the stated {100 * stated:.3f} % at {100 * covered:.0f} % of fresh "
+                    f"poses and loads (at least {100 * COVERED:.0f} %)",
+                    covered >= COVERED,
+                )
+            )
+    if rebuild:
+        # Only this needs the mesher.
+        from wrist_stiffness.fem.solids import MeshSettings
+        from wrist_stiffness.fem.sweep import BuildSettings, build_table
+
+        header = table.header
+        sizes = MeshSettings(**{key: 1e-3 * v for key, v in header.mesh["sizes_mm"].items()})
+        settings = BuildSettings(
+            sizes=sizes,
+            interface=header.interface,  # type: ignore[arg-type]
+            evaluation=header.evaluation,
+            rings=header.mesh["rings"],
+            tolerance=np.inf,
+            per_axis=header.per_axis,
+        )
+        again = build_table(header.geometry, settings, progress)
+        sectors = len(table.components.sectors.gap)
+        for name, sizes_of in (
+            ("operators", lambda values: column_sizes(values, sectors)),
+            ("map_values", lambda values: np.max(np.abs(values), axis=0)),
+        ):
+            old, new = getattr(table, name), getattr(again, name)
+            same_shape = old.shape == new.shape
+            difference = np.max(np.abs(old - new) / sizes_of(old)) if same_shape else np.inf
+            findings.append(
+                Finding(
+                    f"rebuilt {name}",
+                    f"differs by {difference:.1e} of its size (limit {REBUILT_TOLERANCE:.0e})",
+                    bool(difference <= REBUILT_TOLERANCE),
+                )
+            )
+    return findings
+
+
+def _definiteness(table: Table) -> Finding:
+    configuration = table.mechanism.forward(unseen_poses(table.workspace))
+    lowest = min(
+        float(
+            np.min(np.linalg.eigvalsh(_scaled(table.operators_at(configuration, way).compliance)))
+        )
+        for way in ("closed_form", "spline")
+    )
+    return Finding(
+        "compliance", f"smallest scaled eigenvalue {lowest:.1e}, must be > 0", lowest > 0
+    )
+
+
+def _scaled(matrix: Array) -> Array:
+    """Scale a compliance to a unit diagonal, so that metres and radians weigh the same."""
+    size = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
+    scaled: Array = matrix / size[..., :, None] / size[..., None, :]
+    return scaled

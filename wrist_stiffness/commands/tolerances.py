@@ -301,11 +301,7 @@ def _study(
         }
 
     costs = [
-        Cost(
-            tolerance.name,
-            tolerance.sigma,
-            sizes(slopes[i] ** 2, inverse[i, i] * rest),
-        )
+        Cost(tolerance.name, tolerance.sigma, sizes(slopes[i] ** 2, inverse[i, i] * rest))
         for i, tolerance in enumerate(tolerances, start=1)
     ]
     costs.sort(key=lambda cost: -cost.size["s_um"][0])

@@ -14,13 +14,11 @@ if TYPE_CHECKING:
     from wrist_stiffness.commands.explain import Explanation
     from wrist_stiffness.commands.modes import ModeSummary
     from wrist_stiffness.commands.output_changes import TopicChanges
-    from wrist_stiffness.commands.predict import PosePrediction
     from wrist_stiffness.commands.replay_block import ReplaySummary
 
 
-def prediction_lines(found: PosePrediction, loaded: bool) -> list[str]:
+def prediction_lines(values: dict[str, Any], loaded: bool) -> list[str]:
     """Return a predicted error, and whose share it is where a load acts."""
-    values = found.as_values()
     lines = []
     for name, unit, parts in (("s", "um", "shift_um"), ("phi", "mdeg", "rotation_mdeg")):
         x, y, z = values[parts]

@@ -1,0 +1,121 @@
+"""`wrist-stiffness compare` and `diagnose`: what recordings say of models."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+
+from wrist_stiffness.cli.options import JUDGING, MODEL_OPTION, model_named, recordings_named
+from wrist_stiffness.cli.parser import command, flag, option, repeated, say, this_run, value
+from wrist_stiffness.cli.progress import Progress, Status
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.shipped import shipped_file
+
+
+@command(
+    repeated(
+        "--model",
+        "FILE",
+        "model file; the first is what the others are to improve upon (default: the shipped "
+        "wrist's)",
+    ),
+    *JUDGING,
+)
+def compare(arguments: argparse.Namespace) -> int:
+    """How far a model is off from recordings, where and when.
+
+    Say how far a model is off from recordings with a measured pose of the platform: as it stands,
+    and after registrations, encoder zeros and load tare were fitted again; against the noise floor;
+    where in the workspace; and under which condition, in sentences.  Several recordings are
+    sessions of one wrist; a folder stands for the recordings in it.  Several models show the fall
+    of the error.
+
+    for example:
+      wrist-stiffness compare monday tuesday --model my_wrist.yaml --report monday.html
+      wrist-stiffness compare monday --model before.yaml --model after.yaml
+      wrist-stiffness compare all_wrists --each --json fleet.json
+    """
+    from wrist_stiffness.commands.compare import compare
+
+    models = arguments.model or [shipped_file("config/palmieri2015_model.yaml")]
+    recordings = recordings_named(arguments.recordings, arguments)
+    if _for_each(arguments):
+        from wrist_stiffness.commands.fleet import each_recording, table_values
+        from wrist_stiffness.report.fleet_lines import compared_lines
+
+        one = partial(compare, models, run=this_run())
+        rows = each_recording(one, recordings, Progress("recordings"))
+        return say(arguments, compared_lines(rows), table_values(rows, "comparison"))
+    from wrist_stiffness.report.comparison_report import comparison_lines, report_of_comparison
+
+    found = compare(models, recordings, this_run(), Progress)
+    code = say(arguments, comparison_lines(found), found.as_values())
+    if arguments.report:
+        from wrist_stiffness.report.page import write_page
+
+        write_page(arguments.report, report_of_comparison(found))
+    return code
+
+
+@command(
+    MODEL_OPTION,
+    value("--probability", 90.0, "name an effect from this probability on", "PERCENT"),
+    option(
+        "--seconds",
+        "begin no further fit after this time; the answer says what was not tried",
+        type=float,
+        default=float("inf"),
+    ),
+    flag("--ranking", "with --json: every candidate, and what each rival changes in every unit"),
+    *JUDGING,
+)
+def diagnose(arguments: argparse.Namespace) -> int:
+    """Which physical effect is missing in a model.
+
+    Say which physical effect a model misses, from recordings with a measured pose of the platform.
+    Registrations, encoder zeros, load tare and the wrist's tolerances are fitted first; then every
+    effect of the catalogue is tried at every place.  Every finding has a probability; effects that
+    the recordings cannot tell apart are named together.  The answer may be 'nothing' or 'none of
+    these', and then it says on what the error depends.
+    Several recordings are sessions of one wrist: the last one judges what the others show, so
+    record on two days.  Of a single recording the end judges.
+
+    for example:
+      wrist-stiffness diagnose monday tuesday --model my_wrist.yaml --report why.html
+      wrist-stiffness diagnose monday --json why.json
+      wrist-stiffness diagnose all_wrists --each --json fleet.json
+
+    next: 'extend MODEL --effect NAME@COMPONENT' adds what was found; 'plan --diagnosis why.json'
+    says what to record where rivals remain.
+    """
+    from wrist_stiffness.commands.diagnose import diagnose_recordings
+
+    model = model_named(arguments)
+    recordings = recordings_named(arguments.recordings, arguments)
+    naming, seconds = arguments.probability / 100.0, arguments.seconds
+    if _for_each(arguments):
+        from wrist_stiffness.commands.fleet import each_recording, table_values
+        from wrist_stiffness.report.fleet_lines import diagnosed_lines
+
+        one = partial(diagnose_recordings, model, run=this_run(), naming=naming, seconds=seconds)
+        rows = each_recording(one, recordings, Progress("recordings"))
+        return say(arguments, diagnosed_lines(rows), table_values(rows, "diagnosis"))
+    from wrist_stiffness.report.diagnosis_report import diagnosis_lines, report_of_diagnosis
+
+    with Status() as status:
+        found = diagnose_recordings(
+            model, recordings, this_run(), Progress, status, naming, seconds
+        )
+    code = say(arguments, diagnosis_lines(found), found.as_values(arguments.ranking))
+    if arguments.report:
+        from wrist_stiffness.report.page import write_page
+
+        write_page(arguments.report, report_of_diagnosis(found))
+    return code
+
+
+def _for_each(arguments: argparse.Namespace) -> bool:
+    """Tell whether every recording is taken by itself (InputError beside `--report`)."""
+    if arguments.each and arguments.report:
+        raise InputError("--report draws one wrist; leave out --each")
+    return bool(arguments.each)
