@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wrist_stiffness.commands.simulate import CellMessages
+from wrist_stiffness.commands.simulate import write_samples
 from wrist_stiffness.recording import RecordingWriter, open_recording, read_samples
 from wrist_stiffness.simulation.cell import SENSED, CellSample
 
@@ -18,8 +18,8 @@ def test_a_quaternion_does_not_jump_while_the_platform_turns_far(tmp_path):
     block = CellSample(two, two, six, matrix, shift, matrix, shift, warmth)
     path = tmp_path / "turned.mcap"
     with RecordingWriter(path) as writer:
-        messages = CellMessages(writer, whole=True)
-        messages.write(range(1, count + 1), two, block, np.zeros(count, dtype=bool))
+        stamps_ns = np.arange(1, count + 1)
+        write_samples(writer, stamps_ns, two, block, np.zeros(count, dtype=bool), whole=True)
     said = read_samples(open_recording(path)).poses.quaternion
     assert np.linalg.norm(np.diff(said, axis=0), axis=1).max() < np.radians(0.51)
     np.testing.assert_allclose(Rotation.from_quat(said).as_matrix(), matrix, atol=1e-12)

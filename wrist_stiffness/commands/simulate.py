@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import RecordingWriter
 from wrist_stiffness.recording import messages as msg
 from wrist_stiffness.recording.channel import channel_of
+from wrist_stiffness.recording.chunk_writer import Messages
 from wrist_stiffness.recording.fixed_layout import FixedLayout
 from wrist_stiffness.recording.samples import DEFAULT_JOINTS
 from wrist_stiffness.sessions.refitted import SET_UP
@@ -51,8 +52,9 @@ NOT_MEASURED = 1e6
 
 THERMOMETER_STEP_K = 0.1
 
-SECOND_NS = 10**9
 TWO = (0.0, 0.0)
+ROOM = 4 + len(SENSED)
+"""Places for what is said of one sample."""
 
 Mask = NDArray[np.bool_]
 
@@ -91,14 +93,14 @@ def simulate_recording(
     with RecordingWriter(path, overwrite=overwrite) as writer:
         notes = msg.String(json.dumps(recording_notes(table, settings), sort_keys=True))
         writer.write(topics.RECORDING_NOTES, notes, start_ns)
-        messages = CellMessages(writer, whole=settings.sees == "pose")
         for first in range(0, total, BLOCK):
             number = np.arange(first, min(first + BLOCK, total))
             time_s = number / settings.rate_hz
             sent = cell.desired(time_s)
             block = cell.run(time_s, sent)
             stamps_ns = start_ns + np.round(time_s * 1e9).astype(np.int64)
-            messages.write(stamps_ns.tolist(), sent, block, number % thermometer == 0)
+            warmth, whole = number % thermometer == 0, settings.sees == "pose"
+            write_samples(writer, stamps_ns, sent, block, warmth, whole)
             progress(int(number[-1]) + 1, total)
     return Simulated(Path(path), total, total / settings.rate_hz)
 
@@ -192,84 +194,57 @@ def recording_notes(table: Table, settings: CellSettings) -> dict[str, str]:
     }
 
 
-class CellMessages:
-    """Loads, commands, joint states and measured poses of a recording, written as numbers.
+def write_samples(
+    writer: RecordingWriter,
+    stamps_ns: NDArray[np.int64],
+    sent: Array,
+    block: CellSample,
+    warmth: Mask,
+    whole: bool,
+) -> None:
+    """Write n samples as numbers: making and encoding each message as an object took longer.
 
-    A fast cell says thousands of messages a second that differ in their numbers only: making and
-    encoding each as an object took longer than the physics behind it.
-
-    `writer`: open.  `whole`: whether the sensor sees position and rotation; else a huge variance
-    says which it does not.
+    `stamps_ns` (n,): [ns].  `sent` (n, 2): motor commands [rad].  `block`: what the sensors said; a
+    pose of which they measured nothing is not written.  `warmth` (n,): at which samples the
+    thermometers speak.  `whole`: whether the pose sensor sees position and rotation; else a huge
+    variance says which it does not.
     """
+    out, there, nowhere = Messages(), msg.Header(frame_id=BASE_FRAME), msg.Header()
 
-    def __init__(self, writer: RecordingWriter, whole: bool) -> None:
-        there, motors = msg.Header(frame_id=BASE_FRAME), DEFAULT_JOINTS
-        pose = msg.PoseStamped(there) if whole else msg.PoseWithCovarianceStamped(there)
-        self._writer, self._whole = writer, whole
-        self._load = _Stream(writer, topics.LOAD_ESTIMATE, msg.WrenchStamped(there))
-        self._command = _Stream(
-            writer, topics.MOTOR_COMMANDS, msg.JointState(msg.Header(), motors, TWO)
-        )
-        self._state = _Stream(
-            writer, topics.JOINT_STATES, msg.JointState(msg.Header(), motors, TWO, TWO)
-        )
-        self._pose = _Stream(writer, topics.PLATFORM_POSE, pose)
+    def add(rank: int, topic: str, like: msg.Message, rows: Mask, *columns: Array) -> None:
+        places, stamps = np.flatnonzero(rows), stamps_ns[rows]
+        payloads = FixedLayout.of(like).rows(stamps, *(column[rows] for column in columns))
+        number = writer.channel_id(channel_of(topic, type(like)))
+        out.add(number, ROOM * places + rank, stamps, payloads)
 
-    def write(self, stamps_ns: Iterable[int], sent: Array, block: CellSample, warmth: Mask) -> None:
-        """Write n samples; a load goes first, so that it has arrived with its joint state.
-
-        `stamps_ns`: n stamps [ns].  `sent` (n, 2): motor commands [rad].  `block`: what the sensors
-        said; a pose of which they measured nothing is not written.  `warmth` (n,): at which samples
-        the thermometers speak.
-        """
-        states = np.concatenate([block.encoder, block.speed], axis=1)
-        moved, turned = _known(block.measured_shift), _known(block.measured_rotation)
-        poses = self._poses(block, moved, turned)
-        numbers = (each.tolist() for each in (block.wrench, sent, states, poses))
-        for n, (stamp_ns, load, command, state, pose) in enumerate(
-            zip(stamps_ns, *numbers, strict=True)
-        ):
-            self._load.write(stamp_ns, load)
-            self._command.write(stamp_ns, command)
-            self._state.write(stamp_ns, state)
-            if moved[n] or turned[n]:
-                self._pose.write(stamp_ns, pose)
-            if warmth[n]:
-                self._write_temperatures(stamp_ns, block.temperature[n])
-
-    def _poses(self, block: CellSample, moved: Mask, turned: Mask) -> Array:
-        """Return the numbers of the measured poses, (n, 7), and of their variances, (n, 43)."""
-        place = np.where(moved[:, None], block.measured_shift, 0.0)
-        rotation = np.where(turned[:, None, None], block.measured_rotation, np.eye(3))
-        quaternion = Rotation.from_matrix(rotation).as_quat(canonical=True)
-        pose = np.concatenate([place, quaternion], axis=1)
-        if self._whole:
-            return pose
+    every = np.ones(len(stamps_ns), dtype=bool)
+    # A load goes first, so that it has arrived with its joint state.
+    add(0, topics.LOAD_ESTIMATE, msg.WrenchStamped(there), every, *block.wrench.T)
+    command = msg.JointState(nowhere, DEFAULT_JOINTS, TWO)
+    add(1, topics.MOTOR_COMMANDS, command, every, sent)
+    state = msg.JointState(nowhere, DEFAULT_JOINTS, TWO, TWO)
+    add(2, topics.JOINT_STATES, state, every, block.encoder, block.speed)
+    moved, turned = _known(block.measured_shift), _known(block.measured_rotation)
+    rotation = np.where(turned[:, None, None], block.measured_rotation, np.eye(3))
+    pose = [
+        *np.where(moved[:, None], block.measured_shift, 0.0).T,
+        *Rotation.from_matrix(rotation).as_quat(canonical=True).T,
+    ]
+    seen = moved | turned
+    if whole:
+        add(3, topics.PLATFORM_POSE, msg.PoseStamped(there), seen, *pose)
+    else:
         unseen = np.repeat(~np.stack([moved, turned], axis=1), 3, axis=1)
-        variance = NOT_MEASURED * unseen[:, :, None] * np.eye(6)
-        return np.concatenate([pose, variance.reshape(len(pose), 36)], axis=1)
-
-    def _write_temperatures(self, stamp_ns: int, celsius: Array) -> None:
-        for component, each in zip(SENSED, celsius.tolist(), strict=True):
-            shown = THERMOMETER_STEP_K * round(each / THERMOMETER_STEP_K)
-            message = msg.Temperature(
-                msg.Header(stamp_ns, component), shown, THERMOMETER_STEP_K**2 / 12.0
-            )
-            self._writer.write(topics.TEMPERATURES, message, stamp_ns)
+        variance = (NOT_MEASURED * unseen[:, :, None] * np.eye(6)).reshape(-1, 36)
+        add(3, topics.PLATFORM_POSE, msg.PoseWithCovarianceStamped(there), seen, *pose, variance)
+    noise = np.full(len(stamps_ns), THERMOMETER_STEP_K**2 / 12.0)
+    for rank, (component, celsius) in enumerate(zip(SENSED, block.temperature.T, strict=True), 4):
+        shown = THERMOMETER_STEP_K * np.round(celsius / THERMOMETER_STEP_K)
+        like = msg.Temperature(msg.Header(frame_id=component))
+        add(rank, topics.TEMPERATURES, like, warmth, shown, noise)
+    writer.write_block(out)
 
 
 def _known(part: Array) -> Mask:
     """Tell of which samples a part (n, ...) of the pose was measured, (n,): whole or not."""
     return np.isfinite(part.reshape(len(part), -1)[:, 0])
-
-
-class _Stream:
-    """Messages of one topic like a first one, but for their stamps and numbers."""
-
-    def __init__(self, writer: RecordingWriter, topic: str, like: msg.Message) -> None:
-        self._writer, self._channel = writer, channel_of(topic, type(like))
-        self._layout = FixedLayout.of(like)
-
-    def write(self, stamp_ns: int, numbers: Iterable[float]) -> None:
-        payload = self._layout.payload(*divmod(stamp_ns, SECOND_NS), *numbers)
-        self._writer.write_raw(self._channel, payload, stamp_ns)
