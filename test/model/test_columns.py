@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.model.columns import ShapeGrid
 from wrist_stiffness.model.effect import effect_at
+from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.registry import catalogue, find_law
 
 COLUMNS = """
@@ -19,7 +19,7 @@ for law in catalogue().values():
     for place in law.places:
         own = law.linearised(place, frozenset(("motor_1", "link_1")))
         for shape in own.shapes:
-            print(law.id, place, [(c.factor.name, c.trial, c.origin) for c in own.columns(shape)])
+            print(law.id, place, [(c.factor.key, c.trial, c.origin) for c in own.columns(shape)])
 """
 
 
@@ -59,7 +59,7 @@ def matrix(model, block, law, place, shape):
         if each.origin:
             change = change - shown(model, block, law, place, each.origin)
         rows.append(change.ravel() / each.size)
-    sizes = {each.factor.name: each.factor.plausible for each in columns}
+    sizes = {each.factor.key: each.factor.scale for each in columns}
     return np.stack(rows, axis=1), sizes
 
 
@@ -94,8 +94,8 @@ def test_a_mass_begins_where_its_first_moment_says(name):
     recipe = law.linearised(place, frozenset())
     heavy, *moved = recipe.columns(())[:4]
     arm = np.array([1.0, -2.0, 3.0])
-    names = [each.factor.name for each in moved]
-    zero = {each.factor.name: 0.0 for each in recipe.columns(())}
+    names = [each.factor.key for each in moved]
+    zero = {each.factor.key: 0.0 for each in recipe.columns(())}
     found = zero | {"mass_g": 40.0} | dict(zip(names, 40.0 * arm, strict=True))
     start = recipe.start(found, ())
     assert start["mass_g"] == 40.0
@@ -131,4 +131,4 @@ def test_a_carrier_times_signals_is_the_law_between_the_points_of_its_grid_too(
 @pytest.mark.parametrize("grid", [(1.0,), (2.0, 1.0), (1.0, 1.0), (1.0, np.nan)])
 def test_a_grid_that_cannot_be_searched_is_refused(grid):
     with pytest.raises(InputError, match="lag_s: grid .*: not two or more increasing values"):
-        ShapeGrid("lag_s", grid)
+        Parameter("lag_s", 0.0, 1.0, 1.0, grid=grid)

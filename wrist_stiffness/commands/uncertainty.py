@@ -132,7 +132,7 @@ def _tolerances(table: Table) -> Iterator[tuple[str, list[ElasticComponents]]]:
         values = {"flexibility_percent": 0.01 * percent}
         yield (
             f"{kind}s {percent:g} % off (assumed)",
-            [law.changed(parts, table.geometry, place, values) for place in places],
+            [law.changed(parts, place, values) for place in places],
         )
     if table.geometry.pins is None:
         yield "pins not rigid, of steel (assumed)", [_with_pins(table)]

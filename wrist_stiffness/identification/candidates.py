@@ -11,7 +11,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.possible import Possible
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.columns import Carried, Factor, Recipe, Shape, Values
+from wrist_stiffness.model.columns import Carried, Recipe, Shape, Values
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.parameters import Parameter, si_factor
@@ -83,20 +83,15 @@ class WristCandidate:
     @property
     def usual(self) -> Array:
         """Usual size of the factor of each column, (k,)."""
-        return np.array([each.plausible for each in self._factors])
+        return np.array([each.scale for each in self._factors])
 
     @property
     def possible(self) -> Possible:
         """What these factors can be, in usual sizes."""
-        known = {each.key: each for each in self.law.parameters(self.place)}
-        names = [each.name for each in self._factors]
-        if set(names) <= set(known):
-            return possible(self.law, tuple(known[name] for name in names))
-        lower = np.array([each.lower for each in self._factors]) / self.usual
-        return Possible(lower, np.array([each.upper for each in self._factors]) / self.usual)
+        return possible(self.law, tuple(self._factors))
 
     @property
-    def _factors(self) -> list[Factor]:
+    def _factors(self) -> list[Parameter]:
         return [column.factor for column in self.recipe.columns(self.shapes[0])]
 
 

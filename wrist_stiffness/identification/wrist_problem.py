@@ -228,7 +228,7 @@ def _cost(fitted: BaseFit) -> float:
 
 def _begun(candidate: WristCandidate, ranked: Ranked) -> Effect:
     """Return an effect with the values with which a fit begins."""
-    factors = [each.factor.name for each in candidate.recipe.columns(ranked.shape)]
+    factors = [each.factor.key for each in candidate.recipe.columns(ranked.shape)]
     values = (ranked.z * candidate.usual).tolist()
     own = candidate.effect(dict(zip(factors, values, strict=True)), ranked.shape)
     if has_walls(own):

@@ -17,7 +17,7 @@ from wrist_stiffness.mechanism.energy import component_wrenches
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.block import Sample
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.evaluation import Advanced, evaluate, evaluate_beside
+from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.law import Contribution
 from wrist_stiffness.model.situation import Situation
 
@@ -103,13 +103,13 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
         covariance,
         configuration.platform,
         result.warnings,
-        tuple(each.effect.name for each in result.advanced if each and _remembers(each)),
+        # Those that leave a state which would change their answer to the next sample.
+        tuple(
+            each.effect.name
+            for each in result.known.values()
+            if each.after is not None and not each.effect.law.state_is_a_guess
+        ),
     )
-
-
-def _remembers(done: Advanced) -> bool:
-    """Tell whether an effect leaves a state that would change its answer to the next sample."""
-    return done.after is not None and not done.effect.law.state_is_a_guess
 
 
 def _felt(at: Situation, added: Contribution, closed: NDArray[np.bool_]) -> Array:

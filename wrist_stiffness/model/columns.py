@@ -12,9 +12,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-import numpy as np
-
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.parameters import Parameter
@@ -27,38 +24,12 @@ SMALL = 0.1
 
 
 @dataclass(frozen=True)
-class Factor:
-    """What stands in front of a column."""
-
-    name: str  # with its unit; the parameter's where the column is one of a parameter
-    # `lower`, `upper`: what is physically possible
-    lower: float = -np.inf
-    upper: float = np.inf
-    plausible: float = 1.0  # usual size
-
-
-@dataclass(frozen=True)
-class ShapeGrid:
-    """What a law is not linear in, with the values to try first.
-
-    Raises `InputError` if the grid cannot be searched.
-    """
-
-    name: str  # with its unit
-    # two or more increasing values; a search stays between the first and the last
-    grid: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        """Check the grid."""
-        if len(self.grid) < 2 or not np.all(np.diff(self.grid) > 0.0):
-            raise InputError(f"{self.name}: grid {self.grid}: not two or more increasing values")
-
-
-@dataclass(frozen=True)
 class Column:
     """One column: (prediction at `trial` - prediction at `origin`) / size, per unit of a factor."""
 
-    factor: Factor  # what stands in front of the column
+    # what stands in front of the column, with its bounds and usual size: one of the law's
+    # parameters, or one that a recipe has instead
+    factor: Parameter
     # `trial`, `origin`: values of the law's parameters, all of them; an empty origin is the law's
     # absence
     trial: Values
@@ -87,8 +58,8 @@ class Recipe:
 
     Parameters
     ----------
-    shape : tuple of ShapeGrid
-        Grids of what is not linear.
+    shape : tuple of Parameter
+        What is not linear; a search stays between the first and the last value of each grid.
     columns : callable
         shape -> its columns, of the same factors at every shape.
     start : callable
@@ -98,7 +69,7 @@ class Recipe:
         Another way to the same columns.
     """
 
-    shape: tuple[ShapeGrid, ...]
+    shape: tuple[Parameter, ...]
     columns: Callable[[Shape], tuple[Column, ...]]
     start: Callable[[Mapping[str, float], Shape], Values]
     carried: Carried | None = None
@@ -107,11 +78,6 @@ class Recipe:
     def shapes(self) -> list[Shape]:
         """Every point of the grid; one without a shape where all is linear."""
         return list(product(*(each.grid for each in self.shape)))
-
-
-def factor(parameter: Parameter) -> Factor:
-    """Return a parameter as the factor of its column."""
-    return Factor(parameter.key, parameter.lower, parameter.upper, parameter.scale)
 
 
 def tangents(parameters: Sequence[Parameter], held: Collection[str] = ()) -> Recipe:
@@ -135,14 +101,13 @@ def tangents(parameters: Sequence[Parameter], held: Collection[str] = ()) -> Rec
     def columns(at: Shape) -> tuple[Column, ...]:
         sizes = {each: SMALL * each.scale for each in other}
         return tuple(
-            Column(factor(each), still(at) | {each.key: size}, size) for each, size in sizes.items()
+            Column(each, still(at) | {each.key: size}, size) for each, size in sizes.items()
         )
 
     def start(found: Mapping[str, float], at: Shape) -> Values:
         return still(at) | {each.key: found[each.key] for each in other}
 
-    shape = tuple(ShapeGrid(each.key, each.grid) for each in gridded)
-    return Recipe(shape, columns, start)
+    return Recipe(tuple(gridded), columns, start)
 
 
 def at_usual_size(parameter: Parameter, size: float) -> Recipe:
@@ -155,7 +120,7 @@ def at_usual_size(parameter: Parameter, size: float) -> Recipe:
     size : float
         In its unit.
     """
-    column = Column(factor(parameter), {parameter.key: size}, size)
+    column = Column(parameter, {parameter.key: size}, size)
     return Recipe((), lambda at: (column,), lambda found, at: {parameter.key: found[parameter.key]})
 
 
@@ -174,7 +139,7 @@ def share_of_shape(
         Values of the others in every trial.
     """
     gridded = [each for each in parameters if each.grid]
-    own = next(factor(each) for each in parameters if each.key == key)
+    own = next(each for each in parameters if each.key == key)
 
     def values(at: Shape) -> Values:
         return {**(fixed or {}), **dict(zip((each.key for each in gridded), at, strict=True))}
@@ -185,5 +150,4 @@ def share_of_shape(
     def start(found: Mapping[str, float], at: Shape) -> Values:
         return values(at) | {key: found[key]}
 
-    shape = tuple(ShapeGrid(f"at_{each.key}", each.grid) for each in gridded)
-    return Recipe(shape, columns, start)
+    return Recipe(tuple(gridded), columns, start)

@@ -74,10 +74,6 @@ LEFT_OUT = " is missing, left out"
 class MissingSignalError(Exception):
     """A law asks for a signal that the samples lack; the evaluation turns it to a warning."""
 
-    def __init__(self, signal: str) -> None:
-        super().__init__(signal)
-        self.signal = signal
-
 
 SEATS = tuple((LIMB[names[0]], BODIES.index(BODY[names[0]])) for names in GROUPS)
 """Limb and body of each row of screws."""

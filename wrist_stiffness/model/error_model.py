@@ -93,23 +93,17 @@ class ErrorModel:
         What follows from effects that both have is the same object: so an evaluation knows it.
         """
         other = replace(self, effects=effects)
-        same_parts = self._of_parts == other._of_parts
-        if same_parts:
-            vars(other).update(parts=self.parts, home=self.home)
-        known = self._at_home
-        # Only a user's own law may look at the parts.
-        kept = {
-            id(each): known[id(each)]
+        if self._of_parts != other._of_parts:
+            return other
+        known = {id(effect): added for effect, added in self._at_home}
+        constants = tuple(
+            (each, known.get(id(each)) or constant_of(each, self.home))
             for each in effects
-            if id(each) in known and (same_parts or not each.law.foreign)
-        }
-        constant = [each for each in effects if each.law.constant]
-        if len(kept) == len(constant) == len(known):
-            vars(other).update(_at_home=known, constants=self.constants)
-        else:
-            vars(other)["_at_home"] = {
-                id(each): kept.get(id(each)) or constant_of(each, other.home) for each in constant
-            }
+            if each.law.constant
+        )
+        vars(other).update(parts=self.parts, home=self.home, _at_home=constants)
+        if {id(effect) for effect, _ in constants} == known.keys():
+            vars(other)["constants"] = self.constants
         return other
 
     @property
@@ -121,7 +115,7 @@ class ErrorModel:
         """Elastic parts of the table with the effects that change them."""
         parts = self.table.components
         for effect in self._of_parts:
-            parts = effect.law.changed(parts, self.table.geometry, effect.component, effect.si)
+            parts = effect.law.changed(parts, effect.component, effect.si)
         return parts
 
     @cached_property
@@ -130,14 +124,14 @@ class ErrorModel:
         return home_of(self.table, self.parts)
 
     @cached_property
-    def _at_home(self) -> dict[int, Constants]:
-        """What each constant effect adds, by its identity."""
-        return {id(e): constant_of(e, self.home) for e in self.effects if e.law.constant}
+    def _at_home(self) -> tuple[tuple[Effect, Constants], ...]:
+        """What each constant effect adds."""
+        return tuple((e, constant_of(e, self.home)) for e in self.effects if e.law.constant)
 
     @cached_property
     def constants(self) -> Constants:
         """What the constant effects add together."""
-        return sum(self._at_home.values(), Constants())
+        return sum((added for _, added in self._at_home), Constants())
 
     @cached_property
     def changing(self) -> dict[str, list[int]]:
@@ -257,16 +251,8 @@ class ErrorModel:
     def prediction_of(self, twist: Array, row: Array, active: Flags, load: Load) -> Prediction:
         """Return the prediction that these numbers belong to.
 
-        Parameters
-        ----------
-        twist : (6,) float
-            Of the platform at O in F [m, rad].
-        row : (66,) float
-            As `Configuration.of_row` takes it.
-        active : (m,) bool
-            Sectors in contact.
-        load : Load
-            On the platform.
+        `twist` (6,): of the platform at O in F [m, rad]; `row` (66,): as `Configuration.of_row`
+        takes it; `active` (m,): sectors in contact; `load`: on the platform.
         """
         configuration = Configuration.of_row(row)
         of_parameters = None
@@ -296,19 +282,10 @@ class ErrorModel:
         return None not in self._load_shares
 
     def parameter_covariance(self, twist: Array, moved: Sequence[Array]) -> Array:
-        """Covariance from the parameters: those fitted together, and the variations.
+        """Covariance (6, 6) from the parameters: those fitted together, and the variations.
 
-        Parameters
-        ----------
-        twist : (6,) float
-            Predicted [m, rad].
-        moved : sequence of (6,) float
-            The same as each of `variations` predicts it [m, rad].
-
-        Returns
-        -------
-        (6, 6) float
-            Translation first, in F.
+        `twist` (6,): predicted [m, rad]; `moved`, (6,) each: the same as each of `variations`
+        predicts it [m, rad].  Translation first, in F.
         """
         covariance = np.zeros((6, 6)) if self.joint is None else self.joint.covariance
         for other in moved:
@@ -378,17 +355,8 @@ class ErrorModel:
     def table_covariance(self, configuration: Configuration, twist: Array) -> Array:
         """Variance of the table's stated error and of an encoder count spread over its step.
 
-        Parameters
-        ----------
-        configuration : Configuration
-            Of one pose, or of rows.
-        twist : (..., 6) float
-            Predicted there [m, rad].
-
-        Returns
-        -------
-        (..., 6, 6) float
-            Translation first, in F.
+        `configuration`: of one pose, or of rows; `twist` (..., 6): predicted there [m, rad].  Gives
+        (..., 6, 6): translation first, in F.
         """
         covariance = np.zeros((*twist.shape, 6))
         of_size = self.relative_error**2 / 3.0

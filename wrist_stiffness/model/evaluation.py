@@ -29,7 +29,6 @@ from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.contact import solve_contacts
 from wrist_stiffness.mechanism.vectors import both_halves
 from wrist_stiffness.model.block import Block
-from wrist_stiffness.model.block_statics import BlockStatics
 from wrist_stiffness.model.contribution import (
     LEFT_OUT,
     NOTHING,
@@ -41,7 +40,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import STAGES
 from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.prediction import seen
-from wrist_stiffness.model.situation import Situation, lengths
+from wrist_stiffness.model.situation import BlockStatics, Situation, lengths
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -102,11 +101,6 @@ class Evaluated:
     def twist(self) -> Array:
         """Pose error of the platform, first order in every screw, (n, 6) [m, rad]."""
         return self.situation.answer[0]
-
-    @property
-    def force(self) -> Array:
-        """Contact forces, (n, m) [N]."""
-        return self.situation.answer[1]
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -279,7 +273,7 @@ def _advanced(
         before = state if guess is None else guess.after(state)
         added, after = _advanced_by(effect, at, before)
     except MissingSignalError as missing:
-        lacking = f"{effect.name}: {missing.signal}{LEFT_OUT}"
+        lacking = f"{effect.name}: {missing}{LEFT_OUT}"
         return Advanced(effect, at, state, NOTHING, state, (lacking,))
     return Advanced(effect, at, state, added, after, _first_order(effect, added))
 

@@ -121,10 +121,14 @@ def names_in(text: str) -> frozenset[str]:
 
     Raises `InputError` if it cannot be read, or is no formula whatever its names stand for.
     """
-    used = {node.id for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)}
-    names = frozenset(used - COUNTS.keys())
+    names = _names(_parsed(text))
     Formula(text, tuple(names))
     return names
+
+
+def _names(tree: ast.expr) -> frozenset[str]:
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    return frozenset(used - COUNTS.keys())
 
 
 def _parsed(text: str) -> ast.expr:
@@ -154,10 +158,10 @@ class Formula:
         """Check the whole expression."""
         self._check(self._tree, 0)
 
-    @property
+    @cached_property
     def names(self) -> frozenset[str]:
         """Variables that the expression does use."""
-        return names_in(self.text)
+        return _names(self._tree)
 
     @property
     def count(self) -> int:
@@ -216,43 +220,39 @@ class Formula:
     def _check(self, node: ast.expr, depth: int) -> None:
         if depth > DEEPEST:
             raise self._refusal(node, f"nested deeper than {DEEPEST} levels")
-        if depth == 0 and isinstance(node, ast.Tuple) and len(node.elts) > 1:
-            for each in node.elts:
-                self._check(each, 1)
-            return
-        if isinstance(node, ast.Constant):
-            if isinstance(node.value, bool) or not isinstance(node.value, int | float):
-                raise self._refusal(node, f"{node.value!r} is not a number")
-            if not abs(node.value) <= float(np.finfo(float).max):
-                raise self._refusal(node, "the number is too large")
-        elif isinstance(node, ast.Name):
-            if node.id not in self.variables:
+        parts: list[ast.expr] = []
+        match node:
+            case ast.Tuple(elts=[_, _, *_]) if depth == 0:
+                parts = node.elts
+            case ast.Constant(value=number):
+                if isinstance(number, bool) or not isinstance(number, int | float):
+                    raise self._refusal(node, f"{number!r} is not a number")
+                if not abs(number) <= float(np.finfo(float).max):
+                    raise self._refusal(node, "the number is too large")
+            case ast.Name(id=name):
+                if name not in self.variables:
+                    known = ", ".join(self.variables)
+                    raise self._refusal(node, f"unknown name {name}; known are {known}")
+            case ast.BinOp() if type(node.op) in OPERATIONS:
+                parts = [node.left, node.right]
+            case ast.UnaryOp() if type(node.op) in OPERATIONS:
+                parts = [node.operand]
+            case ast.Call(func=ast.Name(id=name), keywords=[]):
+                parts = node.args
+                if name not in COUNTS:
+                    known = ", ".join(COUNTS)
+                    raise self._refusal(node, f"unknown function {name}; known are {known}")
+                if len(parts) != COUNTS[name]:
+                    why = f"{name} takes {COUNTS[name]} values, not {len(parts)}"
+                    raise self._refusal(node, why)
+            case _:
                 raise self._refusal(
-                    node, f"unknown name {node.id}; known are {', '.join(self.variables)}"
+                    node,
+                    "only numbers, names, + - * / **, parentheses, the functions "
+                    f"{', '.join(COUNTS)} and commas between whole formulas are allowed",
                 )
-        elif isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
-            self._check(node.left, depth + 1)
-            self._check(node.right, depth + 1)
-        elif isinstance(node, ast.UnaryOp) and type(node.op) in OPERATIONS:
-            self._check(node.operand, depth + 1)
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-            if node.func.id not in COUNTS:
-                raise self._refusal(
-                    node, f"unknown function {node.func.id}; known are {', '.join(COUNTS)}"
-                )
-            count = COUNTS[node.func.id]
-            if len(node.args) != count:
-                raise self._refusal(
-                    node, f"{node.func.id} takes {count} values, not {len(node.args)}"
-                )
-            for argument in node.args:
-                self._check(argument, depth + 1)
-        else:
-            raise self._refusal(
-                node,
-                "only numbers, names, + - * / **, parentheses, the functions "
-                f"{', '.join(COUNTS)} and commas between whole formulas are allowed",
-            )
+        for part in parts:
+            self._check(part, depth + 1)
 
     def _refusal(self, node: ast.expr, why: str) -> InputError:
         return InputError(f"formula {self.text!r}, column {node.col_offset + 1}: {why}")

@@ -155,8 +155,7 @@ class FormulaLaw(Law):
             reference = at.table.geometry.reference_temperature
             return at.temperature(name.removeprefix(TEMPERATURE)) + reference
         if name in TURNS:
-            joint = TURNS[name]
-            return at.configuration.turn(joint, at.table.geometry.axes[joint])
+            return at.turn(TURNS[name])
         if name in MOTION:
             return np.concatenate([at.block.theta, at.speed], axis=1)[:, MOTION.index(name)]
         if name.startswith("W_") or place == LOAD_SENSOR:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.parameters import AXES
 
 KEYS = {
-    **{f"{axis}_um": 1e-6 for axis in AXES},
-    **{f"turn_{axis}_mdeg": float(np.radians(1e-3)) for axis in AXES},
+    **{f"{axis}_um": 1e-6 for axis in "xyz"},
+    **{f"turn_{axis}_mdeg": float(np.radians(1e-3)) for axis in "xyz"},
 }
 """Names in the model file and their SI sizes."""
 
@@ -42,6 +41,6 @@ class JointUncertainty:
         return {key: value / size for (key, size), value in sizes}
 
     @classmethod
-    def of_values(cls, effects: tuple[str, ...], values: Mapping[str, float]) -> JointUncertainty:
+    def of_values(cls, effects: Sequence[str], **values: float) -> JointUncertainty:
         """Return what `as_values` told."""
-        return cls(effects, np.array([values[key] * size for key, size in KEYS.items()]))
+        return cls(tuple(effects), np.array([values[key] * size for key, size in KEYS.items()]))

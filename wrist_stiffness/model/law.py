@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
-from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.columns import Recipe, tangents
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
 from wrist_stiffness.model.parameters import Parameter
@@ -23,6 +22,13 @@ STAGES: tuple[Stage, ...] = ("parts", "load", "geometry", "friction", "reaction"
 """What a law changes, in the order of evaluation: elastic parts; wrenches on the bodies; screws and
 gaps that no force decides; forces of joints that rub; screws and wrenches that follow the forces
 through the components; what the pose sensor says."""
+
+
+SIValues = Mapping[str, float]
+"""Values of a law's parameters in SI units, by their full names."""
+
+Outcome = tuple[Contribution, Any]
+"""What a law adds, and its state for the next block."""
 
 
 class Law:
@@ -124,9 +130,7 @@ class Law:
         """
         return tangents(self.parameters(place))
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return what the effect adds at every sample of a block, and the state after it.
 
         A law without memory overrides `added` instead.
@@ -156,7 +160,7 @@ class Law:
         """
         return self.added(at, place, values), None
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the same of a law that remembers nothing."""
         return NOTHING
 
@@ -176,21 +180,15 @@ class Law:
         """Return whether it is in what sensors say of the motion; the wrist itself is right."""
         return self.stage_at(place) == "sensor"
 
-    def changed(
-        self,
-        parts: ElasticComponents,
-        geometry: Geometry,
-        place: str,
-        values: Mapping[str, float],
-    ) -> ElasticComponents:
+    def changed(self, parts: ElasticComponents, place: str, values: SIValues) -> ElasticComponents:
         """Return the elastic parts with the effect; only laws of the stage `parts` change them."""
         return parts
 
-    def part_factor(self, values: Mapping[str, float]) -> float:
+    def part_factor(self, values: SIValues) -> float:
         """Return by how much a law of the stage `parts` scales the flexibility of its part."""
         return 1.0
 
-    def load_share(self, values: Mapping[str, float]) -> float | None:
+    def load_share(self, values: SIValues) -> float | None:
         """Return the share of the said load that the law adds; None where it adds anything else."""
         return None
 
@@ -204,4 +202,15 @@ def require_id(name: str) -> None:
         raise InputError(f"effect {name!r}: a name has letters, digits, '_', '-' and '.' only")
 
 
-__all__ = ["NOTHING", "STAGES", "Contribution", "Law", "MissingSignalError", "Stage", "require_id"]
+__all__ = [
+    "NOTHING",
+    "STAGES",
+    "Contribution",
+    "Law",
+    "MissingSignalError",
+    "Outcome",
+    "SIValues",
+    "Situation",
+    "Stage",
+    "require_id",
+]

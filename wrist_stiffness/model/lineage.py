@@ -21,11 +21,8 @@ class Step:
 
     def as_values(self) -> dict[str, Any]:
         """Return the step as the model file holds it."""
-        values: dict[str, Any] = {
-            "command": self.command,
-            "date": self.date,
-            "parent_sha256": self.parent_sha256,
-            "recordings": dict(self.recordings),
+        return {
+            name: dict(value) if isinstance(value, Mapping) else value
+            for name, value in vars(self).items()
+            if value or name not in ("measured", "added")
         }
-        values |= {"measured": dict(self.measured)} if self.measured else {}
-        return values | ({"added": self.added} if self.added else {})

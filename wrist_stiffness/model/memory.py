@@ -6,17 +6,19 @@ takes log2(n) passes of NumPy instead of n steps of Python.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 
 
-def play(values: Array, half_width: Array | float, start: Array) -> Array:
+def play(values: Array, half_width: Array | float, start: Array | None) -> Array:
     """Follow a value with lost motion: y_i = clip(y_{i-1}, u_i - h, u_i + h).
 
     `values` (n, ...): u, the driving value; `half_width` float or (n, ...): h, not negative;
-    `start` (...): y before the first sample.  Gives (n, ...): y, exact to the bit in any split of
-    the samples.
+    `start` (...): y before the first sample, None for u there.  Gives (n, ...): y, exact to the bit
+    in any split of the samples.
     """
     low, high = values - half_width, values + half_width
     step = 1
@@ -27,7 +29,7 @@ def play(values: Array, half_width: Array | float, start: Array) -> Array:
             np.clip(high[:-step], low[step:], high[step:]),
         )
         step *= 2
-    return np.clip(start, low, high)
+    return np.clip(values[0] if start is None else start, low, high)
 
 
 Before = tuple[float, Array]
@@ -62,3 +64,13 @@ def lag(values: Array, interval: Array, time_constant: float, before: Array, sta
         decay[step:] = decay[step:] * decay[:-step]
         step *= 2
     return decay * start + sum_
+
+
+def lagged(time: Array, values: Array, time_constant: float, state: Any) -> tuple[Array, Any]:
+    """Return values (n, k) behind a first-order lag, settled at the first sample, and the state."""
+    if time_constant <= 0.0:
+        return values, None
+    before_time, before, start = state if state else (time[0], values[0], values[0])
+    interval = np.diff(time, prepend=before_time)
+    slow = lag(values, interval, time_constant, before, start)
+    return slow, (time[-1], values[-1], slow[-1])

@@ -54,10 +54,6 @@ def _directions(node: Node) -> Array:
     return np.array(list_of(vector(6))(node)) if many else vector(6)(node)
 
 
-def _joint(effects: list[str], **values: float) -> JointUncertainty:
-    return JointUncertainty.of_values(tuple(effects), values)
-
-
 PLACED = {"effect": text(), "component": text()}
 PARAMETERS = {"parameters": mapping_of(_estimate)}
 CATALOGUE = record(PLACED, PARAMETERS)
@@ -85,7 +81,7 @@ MODEL = record(
         ),
         "joint_uncertainty": record(
             {"effects": list_of(text()), **dict.fromkeys(KEYS, number(at_least=0.0))},
-            make=_joint,
+            make=JointUncertainty.of_values,
         ),
     },
 )

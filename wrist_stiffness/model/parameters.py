@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 
 UNITS = {
@@ -72,6 +73,11 @@ class Parameter:
     grid : tuple of float
         Two or more increasing values to try first of a parameter in which the law is not linear;
         those of the catalogue are assumed.
+
+    Raises
+    ------
+    InputError
+        If the grid cannot be searched.
     """
 
     key: str
@@ -81,6 +87,11 @@ class Parameter:
     mean: float = 0.0
     linear: bool = True
     grid: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the grid."""
+        if self.grid and not (len(self.grid) > 1 and np.all(np.diff(self.grid) > 0.0)):
+            raise InputError(f"{self.key}: grid {self.grid}: not two or more increasing values")
 
     def within(self, value: float) -> float:
         """Return a value, brought within the bounds."""
@@ -108,12 +119,9 @@ def symmetric(key: str, bound: float, scale: float) -> Parameter:
     return Parameter(key, -bound, bound, scale)
 
 
-AXES = ("x", "y", "z")
-
-
 def axis_keys(pattern: str) -> tuple[str, ...]:
     """Return three keys, `pattern` with `{}` replaced by x, y and z."""
-    return tuple(pattern.format(axis) for axis in AXES)
+    return tuple(pattern.format(axis) for axis in "xyz")
 
 
 def symmetric_vector(pattern: str, bound: float, scale: float) -> tuple[Parameter, ...]:
@@ -121,21 +129,6 @@ def symmetric_vector(pattern: str, bound: float, scale: float) -> tuple[Paramete
     return tuple(symmetric(key, bound, scale) for key in axis_keys(pattern))
 
 
-def vector(values: Mapping[str, float], pattern: str) -> Array:
-    """Return the three values of a pattern, (3,)."""
-    return np.array([values[key] for key in axis_keys(pattern)])
-
-
-SHIFT, TURN = "shift_{}_um", "turn_{}_mdeg"
-
-
-TWIST = (*symmetric_vector(SHIFT, 1e5, 1000.0), *symmetric_vector(TURN, 2e4, 200.0))
-"""Six parameters of a small screw: where something was set up by hand."""
-
-
-def twist(values: Mapping[str, float]) -> Array:
-    """Return the small screw that six parameters state, (6,) [m, rad]."""
-    return np.concatenate([vector(values, SHIFT), vector(values, TURN)])
-
-
-FORCE, MOMENT = "f{}_N", "m{}_Nmm"
+def vector(values: Mapping[str, float], *patterns: str) -> Array:
+    """Return the three values of each of k patterns, (3 k,)."""
+    return np.array([values[key] for pattern in patterns for key in axis_keys(pattern)])

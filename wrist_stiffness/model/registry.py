@@ -137,22 +137,18 @@ def _require_parameters(law: Law, place: str) -> None:
                 if not each.scale > 0.0:
                     raise InputError(f"{each.key}: scale = {each.scale} is not above 0")
             asked = "linearised"
-            _begin(law, component)
+            # The first columns, and the effect with which a fit would begin.
+            recipe = law.linearised(component, frozenset())
+            shape = recipe.shapes[0]
+            columns = recipe.columns(shape)
+            begin = recipe.start({column.factor.key: 0.0 for column in columns}, shape)
+            for values in (begin, *(column.trial for column in columns)):
+                effect_at(law, component, values)
         except InputError as error:
             raise InputError(f"{place}: {error}") from error
         except (Exception, SystemExit) as error:
             said = f"{type(error).__name__}: {error}"
             raise InputError(f"{place}: {asked}({component!r}): {said}") from error
-
-
-def _begin(law: Law, component: str) -> None:
-    """Make the first columns of a law and the effect with which a fit would begin."""
-    recipe = law.linearised(component, frozenset())
-    shape = recipe.shapes[0]
-    columns = recipe.columns(shape)
-    factors = {column.factor.name: 0.0 for column in columns}
-    for values in (recipe.start(factors, shape), *(column.trial for column in columns)):
-        effect_at(law, component, values)
 
 
 def law_from_file(reference: str, folder: Path) -> Law:

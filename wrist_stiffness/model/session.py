@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Sample
-from wrist_stiffness.model.evaluation import Memory, evaluate, evaluate_beside
+from wrist_stiffness.model.evaluation import Evaluated, Memory, evaluate, evaluate_beside
 from wrist_stiffness.model.prediction import Prediction
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ class Session:
 
     def __init__(self, model: ErrorModel) -> None:
         self.model = model
-        self._memory: Memory | None = None
-        self._others: list[Memory] | None = None
+        # of the model itself, and of each of its `variations`
+        self._memories: Sequence[Memory | None] = [None] * (1 + len(model.variations))
 
     def advance(self, sample: Sample) -> Prediction:
         """Predict one sample and remember it.
@@ -39,9 +39,8 @@ class Session:
         `sample`: not earlier than the one before.  Raises `WristError` if the sample is out of
         range, not finite or earlier than the one before; it is not remembered.
         """
-        prediction, self._memory, varied = self._predicted(sample)
-        if self.model.variations:
-            self._others = varied()[1]
+        prediction, memories = self._predicted(sample)
+        self._memories = memories()
         return prediction
 
     def preview(self, sample: Sample) -> Prediction:
@@ -51,10 +50,9 @@ class Session:
         """
         return self._predicted(sample)[0]
 
-    def _predicted(
-        self, sample: Sample
-    ) -> tuple[Prediction, Memory, Callable[[], tuple[Array, list[Memory]]]]:
-        model, memory = self.model, self._memory
+    def _predicted(self, sample: Sample) -> tuple[Prediction, Callable[[], list[Memory]]]:
+        """Return the prediction, and what returns the memories after it."""
+        model, (memory, *others) = self.model, self._memories
         if not np.isfinite(sample.time):
             raise InputError(f"sample: time {sample.time} is not finite")
         if sample.theta_dot is not None and not np.isfinite(sample.theta_dot).all():
@@ -65,13 +63,12 @@ class Session:
             )
         if model.stateless:
             plain = model.predict(sample.theta, sample.load, memory.active if memory else None)
-            later = Memory((), sample.time, sample.theta, plain.active)
-            return plain, later, lambda: (plain.covariance, [])
+            return plain, lambda: [Memory((), sample.time, sample.theta, plain.active)]
         configuration = model.table.workspace.configuration(sample.theta)
         model.table.check_load(sample.load.wrench)
         pose = configuration if model.evaluation == "closed_form" else None
         result = evaluate(model, sample.block, memory, pose)
-        twist, others = result.twist[0], self._others
+        twist = result.twist[0]
         turn = float(np.abs(twist[3:]).max())
         if not turn < LARGEST_TURN:
             raise InputError(
@@ -80,11 +77,8 @@ class Session:
             )
 
         @cache
-        def varied() -> tuple[Array, list[Memory]]:
-            before: list[Memory | None] = [*others] if others else [None] * len(model.variations)
-            found = evaluate_beside(model.variations, before, result)
-            covariance = model.parameter_covariance(twist, [moved.twist[0] for moved in found])
-            return covariance, [moved.memory for moved in found]
+        def varied() -> list[Evaluated]:
+            return evaluate_beside(model.variations, others, result)
 
         left, right = result.situation.sensor
         prediction = Prediction(
@@ -93,10 +87,10 @@ class Session:
             result.active[0],
             model.table_covariance,
             (_only(left), _only(right)),
-            lambda: varied()[0],
+            lambda: model.parameter_covariance(twist, [each.twist[0] for each in varied()]),
             warnings=result.warnings,
         )
-        return prediction, result.memory, varied
+        return prediction, lambda: [each.memory for each in (result, *varied())]
 
 
 def _only(rows: Array | None) -> Array | None:

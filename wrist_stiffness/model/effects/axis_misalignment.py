@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from wrist_stiffness.mechanism.components import JOINTS
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.law import Contribution, Law, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.places import cross_axes
-from wrist_stiffness.model.situation import Situation
 
 SHIFTS = {
     "joint_1": "uvw",
@@ -51,7 +48,7 @@ class AxisMisalignment(Law):
             *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in TILTS[place]),
         )
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the screw, turned with its body."""
         axes = cross_axes(at.table.geometry, place)
         shift, tilt = (

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, Array
-from wrist_stiffness.model.columns import Recipe, share_of_shape, tangents
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.mechanism.components import ELASTIC, JOINTS
+from wrist_stiffness.model.columns import Recipe, share_of_shape
+from wrist_stiffness.model.law import Contribution, Law, Outcome, Situation, SIValues
+from wrist_stiffness.model.memory import lagged
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.model.places import LIMB
-from wrist_stiffness.model.situation import Situation, lengths
-from wrist_stiffness.model.warmth import WARMTH, lagged, unused, warmth
+from wrist_stiffness.model.situation import lengths
 
 HARDENINGS = (5.0, 50.0, 300.0)
 TIMES_S = (2.0, 8.0, 25.0, 90.0, 400.0)
@@ -33,35 +31,11 @@ class BushingHardening(Law):
         """Return what hardening of several sizes does, times a share of each."""
         return share_of_shape(self.own, "hardening_percent_per_N")
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the screw that is missing."""
         force = lengths(at.through_place(place)[:, :3])
         stiffened = values["hardening_percent_per_N"] * force
-        return _extra(at, place, -stiffened / (1.0 + stiffened))
-
-
-class ThermalSoftening(Law):
-    """Flexibility grows with the temperature above reference."""
-
-    id = "thermal_softening"
-    stage = "reaction"
-    places = JOINTS
-    sentence = "the bushing of {place} softens as it warms"
-    check = "repeat one loaded pose cold and warm"
-    signals = ("temperature of the joint, or ambient, or its motor",)
-    excited_by = "the same loads at temperatures at least 5 K apart"
-    own = (Parameter("softening_percent_per_K", -5.0, 100.0, 1.0), *WARMTH)
-
-    def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
-        """Return tangents, on a grid of how the part warms where no thermometer says it."""
-        return tangents(self.own, unused(place, signals))
-
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
-        """Return the further screw."""
-        warm, state = warmth(at, place, values, state)
-        return _extra(at, place, values["softening_percent_per_K"] * warm), state
+        return at.elastic_share(place, -stiffened / (1.0 + stiffened))
 
 
 class Creep(Law):
@@ -78,16 +52,9 @@ class Creep(Law):
         Parameter("time_constant_s", 0.1, 1e5, 60.0, 60.0, linear=False, grid=TIMES_S),
     )
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the delayed screw; it turns with the bushing."""
         wrench = at.at_home(place, at.through_place(place))
         slow, state = lagged(at.block.time, wrench, values["time_constant_s"], state)
         flexibility = at.parts.flexibility[ELASTIC.index(place)]
         return at.screw(place, values["delayed_percent"] * slow @ flexibility.T), state
-
-
-def _extra(at: Situation, place: str, fraction: Array) -> Contribution:
-    """Return fraction (n,) times the elastic screw of a bushing as a contribution."""
-    return Contribution(**{LIMB[place]: fraction[:, None] * at.elastic_screw(place)})

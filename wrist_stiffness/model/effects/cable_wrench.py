@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.law import Contribution, Law, Outcome, Situation, SIValues
 from wrist_stiffness.model.memory import play
-from wrist_stiffness.model.parameters import Parameter, axis_keys, symmetric
-from wrist_stiffness.model.situation import Situation
+from wrist_stiffness.model.parameters import Parameter, axis_keys, symmetric, vector
 
 PATTERNS = (
     *("f{}_N", "m{}_Nmm"),
     *("f{}_1_N_per_rad", "m{}_1_Nmm_per_rad"),
     *("f{}_2_N_per_rad", "m{}_2_Nmm_per_rad"),
 )
-KEYS = tuple(key for pattern in PATTERNS for key in axis_keys(pattern))
 """Force and moment at zero angles, and by each motor's angle."""
 
 
@@ -32,17 +29,16 @@ class CableWrench(Law):
     excited_by = "unloaded poses all over the workspace, approached from both sides"
     smooth = False
     own = (
-        *(symmetric(key, *((50.0, 0.2) if key[0] == "f" else (2000.0, 5.0))) for key in KEYS),
+        *(
+            symmetric(key, *((50.0, 0.2) if key[0] == "f" else (2000.0, 5.0)))
+            for pattern in PATTERNS
+            for key in axis_keys(pattern)
+        ),
         Parameter("hysteresis_deg", 0.0, 60.0, 3.0, linear=False, grid=(0.0, 5.0)),
     )
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the wrench."""
-        angles = at.block.theta
-        followed = play(
-            angles, 0.5 * values["hysteresis_deg"], angles[0] if state is None else state
-        )
-        constant, *slopes = np.array([values[key] for key in KEYS]).reshape(3, 6)
+        followed = play(at.block.theta, 0.5 * values["hysteresis_deg"], state)
+        constant, *slopes = vector(values, *PATTERNS).reshape(3, 6)
         return Contribution(wrench=constant + followed @ np.array(slopes)), followed[-1]

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS
 from wrist_stiffness.model.columns import Recipe, share_of_shape
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.law import Law, Outcome, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.rubbing import Rubbing, slip
-from wrist_stiffness.model.situation import Situation
 
 
 class JointFriction(Law):
@@ -43,9 +41,7 @@ class JointFriction(Law):
         """Return what friction of several sizes does, of short and soft bristles, times a share."""
         return share_of_shape(self.own, "coefficient", {"preload_N": 0.0, "presliding_um": 3.0})
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the friction force and torque; the state is the bristle's foot."""
         rubbing = Rubbing(place, *(values[each.key] for each in self.own))
         bristles = rubbing.bristles(at)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -10,11 +9,10 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.model.columns import Recipe, at_usual_size, share_of_shape
-from wrist_stiffness.model.law import NOTHING, Contribution, Law
+from wrist_stiffness.model.law import NOTHING, Contribution, Law, Outcome, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.model.pin_play import SMALL_FORCE
 from wrist_stiffness.model.pin_rest import Pin
-from wrist_stiffness.model.situation import Situation
 
 GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
 """Changes of a gap that are tried first, of both signs."""
@@ -38,7 +36,7 @@ class FlangeContact(Law):
         """Return what gaps of several sizes do, times a share of each."""
         return share_of_shape(self.own, "gap_um")
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the opening of the joint's sectors."""
         own = at.parts.sectors.component == ELASTIC.index(place)
         gap = np.where(own, values["gap_um"], 0.0)
@@ -80,9 +78,7 @@ class JointClearance(Law):
         """Return the column of a small clearance, in which no flange stands in the way."""
         return at_usual_size(self.own[0], 5.0)
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the screw of the play."""
         radial = 0.5 * values["clearance_um"]
         if radial == 0.0:

@@ -8,17 +8,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.mechanism.vectors import cross
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.law import Contribution, Law, Situation, SIValues
 from wrist_stiffness.model.parameters import (
-    FORCE,
-    MOMENT,
     Parameter,
     axis_keys,
     symmetric,
     symmetric_vector,
     vector,
 )
-from wrist_stiffness.model.situation import Situation
+
+FORCE, MOMENT = "f{}_N", "m{}_Nmm"
 
 
 class LoadBias(Law):
@@ -34,9 +33,9 @@ class LoadBias(Law):
     inexactness = 0.0
     own = (*symmetric_vector(FORCE, 5.0, 0.1), *symmetric_vector(MOMENT, 100.0, 2.0))
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return true minus said."""
-        bias = np.concatenate([vector(values, FORCE), vector(values, MOMENT)])
+        bias = vector(values, FORCE, MOMENT)
         return Contribution(wrench=np.tile(-bias, (len(at.block), 1)))
 
 
@@ -52,7 +51,7 @@ class LoadScale(Law):
     inexactness = 0.0
     own = (Parameter("scale_percent", -50.0, 3000.0, 3.0, linear=False),)
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return true minus said."""
         return Contribution(wrench=self.load_share(values) * at.load)
 
@@ -96,7 +95,7 @@ class LoadCrossTalk(Law):
     inexactness = 0.0
     own = tuple(symmetric(key, *TALK_PRIOR[key.split("_", 3)[3]]) for key in TALK)
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return true minus said."""
         shares = np.zeros((6, 6))
         for key, entry in TALK.items():
@@ -127,7 +126,7 @@ class LoadMisalignment(Law):
         for key in axis_keys(pattern)
     )
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return true minus said."""
         base = Rotation.from_rotvec(vector(values, TURN_BASE))
         platform = Rotation.from_rotvec(at.body("platform") @ vector(values, TURN_PLATFORM))
@@ -153,7 +152,7 @@ class LoadPoint(Law):
         *symmetric_vector(LEVER_PLATFORM, 1000.0, 2.0),
     )
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the missing moment."""
         lever = vector(values, LEVER_BASE) + at.body("platform") @ vector(values, LEVER_PLATFORM)
         wrench = np.zeros_like(at.load)

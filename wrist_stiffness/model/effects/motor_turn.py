@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -11,10 +10,9 @@ import numpy as np
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.columns import Carried, Recipe, Shape, at_usual_size, tangents
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.law import Contribution, Law, Outcome, Situation, SIValues
 from wrist_stiffness.model.memory import play
 from wrist_stiffness.model.parameters import Parameter, symmetric
-from wrist_stiffness.model.situation import Situation
 
 
 class EncoderOffset(Law):
@@ -30,7 +28,7 @@ class EncoderOffset(Law):
     inexactness = 0.0
     own = (symmetric("offset_mdeg", 5000.0, 100.0),)
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the turn."""
         return at.motor_turn(place, np.full(len(at.block), values["offset_mdeg"]))
 
@@ -51,14 +49,14 @@ class EncoderEccentricity(Law):
         for wave in ("cos", "sin")
     )
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the turn."""
         angle = at.block.theta[:, MOTORS.index(place)]
-        turn = np.zeros_like(angle)
-        for order in (1, 2):
-            turn += values[f"cos_{order}_mdeg"] * np.cos(order * angle)
-            turn += values[f"sin_{order}_mdeg"] * np.sin(order * angle)
-        return at.motor_turn(place, turn)
+        waves = [
+            _wave(values, f"cos_{order}_mdeg", f"sin_{order}_mdeg", order * angle)
+            for order in (1, 2)
+        ]
+        return at.motor_turn(place, sum(waves, np.zeros_like(angle)))
 
 
 class Backlash(Law):
@@ -81,13 +79,10 @@ class Backlash(Law):
         (width,) = self.own
         return at_usual_size(width, width.scale)
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return output minus motor as a turn."""
         angle = at.block.theta[:, MOTORS.index(place)]
-        start = angle[0] if state is None else state
-        output = play(angle, 0.5 * values["width_mdeg"], start)
+        output = play(angle, 0.5 * values["width_mdeg"], state)
         return at.motor_turn(place, output - angle), output[-1]
 
 
@@ -136,13 +131,16 @@ class TransmissionError(Law):
         carried = Carried("encoder_offset", {"offset_mdeg": 1.0}, turns)
         return replace(tangents(self.own, held=RUN_OUT), carried=carried)
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the turn."""
         angle = at.block.theta[:, MOTORS.index(place)]
-        turn = np.zeros_like(angle)
-        for harmonic in HARMONICS:
-            cosine, sine = amplitudes(harmonic)
-            phase = harmonic * values["order"] * angle
-            turn += values[cosine] * np.cos(phase) + values[sine] * np.sin(phase)
-        run_out = values[RUN_OUT[0]] * np.cos(angle) + values[RUN_OUT[1]] * np.sin(angle)
-        return at.motor_turn(place, (1.0 + run_out) * turn)
+        waves = [
+            _wave(values, *amplitudes(harmonic), harmonic * values["order"] * angle)
+            for harmonic in HARMONICS
+        ]
+        run_out = _wave(values, *RUN_OUT, angle)
+        return at.motor_turn(place, (1.0 + run_out) * sum(waves, np.zeros_like(angle)))
+
+
+def _wave(values: SIValues, cosine: str, sine: str, phase: Array) -> Array:
+    return values[cosine] * np.cos(phase) + values[sine] * np.sin(phase)

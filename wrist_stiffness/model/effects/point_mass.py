@@ -11,11 +11,10 @@ from scipy.spatial.transform import Rotation
 from wrist_stiffness.mechanism.components import ELASTIC, LINKS
 from wrist_stiffness.mechanism.statics import component_rotations, weight_wrench
 from wrist_stiffness.mechanism.vectors import cross
-from wrist_stiffness.model.columns import Column, Factor, Recipe, Shape, Values, factor
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.columns import Column, Recipe, Shape, Values
+from wrist_stiffness.model.law import Contribution, Law, Outcome, Situation, SIValues
 from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.parameters import Parameter, vector
-from wrist_stiffness.model.situation import Situation
 
 PLACE = {axis: f"{axis}_mm" for axis in "xyz"}
 
@@ -40,10 +39,10 @@ def mass_columns(
     own = {each.key: each for each in parameters}
     heavy = at | {"mass_g": mass_g}
     return (
-        Column(factor(own["mass_g"]), heavy, mass_g),
+        Column(own["mass_g"], heavy, mass_g),
         *(
             Column(
-                Factor(_moment(axis), plausible=own["mass_g"].scale * own[key].scale),
+                Parameter(_moment(axis), -np.inf, np.inf, own["mass_g"].scale * own[key].scale),
                 heavy | {key: at[key] + arm_mm},
                 mass_g * arm_mm,
                 heavy,
@@ -103,7 +102,7 @@ class Gravity(Law):
         columns = mass_columns(parameters, TRIAL_G, nothing, TRIAL_MM)
         tilts = [each for each in parameters if each.key in TILTS]
         columns += tuple(
-            Column(factor(each), nothing | {each.key: TRIAL_MDEG}, TRIAL_MDEG) for each in tilts
+            Column(each, nothing | {each.key: TRIAL_MDEG}, TRIAL_MDEG) for each in tilts
         )
 
         def start(found: Mapping[str, float], at: Shape) -> Values:
@@ -113,7 +112,7 @@ class Gravity(Law):
 
         return Recipe((), lambda at: columns, start)
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the weight as a wrench, and the change of all weights by the tilt."""
         modelled = at.table.geometry.gravity
         tilt = [values.get(key, 0.0) for key in TILTS]
@@ -165,7 +164,7 @@ class Inertia(Law):
         trial = AT_PLATE | {"mass_g": 0.0, "inertia_gmm2": inertia.scale}
         columns = (
             *mass_columns(self.own, mass.scale, AT_PLATE, 1.0),
-            Column(factor(inertia), trial, inertia.scale),
+            Column(inertia, trial, inertia.scale),
         )
 
         def start(found: Mapping[str, float], at: Shape) -> Values:
@@ -175,9 +174,7 @@ class Inertia(Law):
 
         return Recipe((), lambda at: columns, start)
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the wrench; the state is the last sample's time and velocity."""
         omega = (at.jacobian @ at.speed[..., None])[..., 0]
         alpha, state = slope(at.block.time, omega, state)

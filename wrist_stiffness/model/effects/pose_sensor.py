@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.model.law import Contribution, Law
-from wrist_stiffness.model.parameters import TWIST, symmetric_vector, twist, vector
-from wrist_stiffness.model.situation import Situation
+from wrist_stiffness.model.law import Contribution, Law, Outcome, Situation, SIValues
+from wrist_stiffness.model.parameters import symmetric_vector, vector
+
+SHIFT, TURN = "shift_{}_um", "turn_{}_mdeg"
+
+TWIST = (*symmetric_vector(SHIFT, 1e5, 1000.0), *symmetric_vector(TURN, 2e4, 200.0))
+"""Six parameters of a small screw: where something was set up by hand."""
 
 
 class MeasurementFrame(Law):
@@ -25,9 +28,9 @@ class MeasurementFrame(Law):
     inexactness = 0.0
     own = TWIST
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the screw at every sample."""
-        return Contribution(sensor_left=np.tile(twist(values), (len(at.block), 1)))
+        return Contribution(sensor_left=np.tile(vector(values, SHIFT, TURN), (len(at.block), 1)))
 
 
 class TargetMounting(Law):
@@ -43,9 +46,9 @@ class TargetMounting(Law):
     inexactness = 0.0
     own = TWIST
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the screw, turned with the platform."""
-        return Contribution(sensor_right=at.in_base("platform", twist(values)))
+        return Contribution(sensor_right=at.in_base("platform", vector(values, SHIFT, TURN)))
 
 
 DRIFT_SHIFT, DRIFT_TURN = "shift_{}_um_per_h", "turn_{}_mdeg_per_h"
@@ -62,10 +65,8 @@ class Drift(Law):
     excited_by = "the same pose again and again over the whole session, or a target on the frame"
     own = (*symmetric_vector(DRIFT_SHIFT, 1e4, 10.0), *symmetric_vector(DRIFT_TURN, 1e4, 5.0))
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the screw; the state is the time of the first sample."""
         start = at.block.time[0] if state is None else state
-        rate = np.concatenate([vector(values, DRIFT_SHIFT), vector(values, DRIFT_TURN)])
+        rate = vector(values, DRIFT_SHIFT, DRIFT_TURN)
         return Contribution(sensor_left=np.outer(at.block.time - start, rate)), start

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
-from wrist_stiffness.model.law import Contribution, Law, Stage
+from wrist_stiffness.model.law import Contribution, Law, Outcome, Situation, SIValues, Stage
 from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.model.situation import Situation
 
 STAGE: dict[str, Stage] = {
     "pose_sensor": "sensor",
@@ -98,9 +96,7 @@ class TimeDelay(Law):
         """Return True but for the load: a late encoder stamp does not move the motor."""
         return place != "load_sensor"
 
-    def advance(
-        self, at: Situation, place: str, values: Mapping[str, float], state: Any
-    ) -> tuple[Contribution, Any]:
+    def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return what happened between the truth and its stamp; the state is the last of it."""
         delay = values["delay_ms"]
         if place == "load_sensor":

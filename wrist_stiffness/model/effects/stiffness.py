@@ -1,18 +1,68 @@
-"""Springs in series with the wrist, each at a point of a place."""
+"""Parts that are more flexible than modelled, and springs in series, each at a point of a place."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.mechanism.components import MOTORS, Array
+from wrist_stiffness.mechanism.components import (
+    ELASTIC,
+    JOINTS,
+    LINKS,
+    MOTORS,
+    Array,
+    ElasticComponents,
+)
 from wrist_stiffness.mechanism.geometry import Geometry
-from wrist_stiffness.model.law import Contribution, Law
+from wrist_stiffness.model.law import Contribution, Law, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.places import MOTOR_JOINT, bushing_centre, screw_from, wrench_at
-from wrist_stiffness.model.situation import Situation
+
+
+class LinkStiffness(Law):
+    """Flexibility of a link times (1 + fraction), exactly."""
+
+    id = "link_stiffness"
+    stage = "parts"
+    places: tuple[str, ...] = LINKS
+    sentence = "{place} bends more (or less) than modelled"
+    check = "compare the link's section and material with the drawing; look for a crack"
+    excited_by = "loads of several sizes and directions at poses all over the workspace"
+    inexactness = 0.03
+    own = (Parameter("flexibility_percent", -90.0, 10000.0, 30.0, linear=False),)
+
+    def part_factor(self, values: SIValues) -> float:
+        """Return 1 + fraction."""
+        return 1.0 + values["flexibility_percent"]
+
+    def changed(self, parts: ElasticComponents, place: str, values: SIValues) -> ElasticComponents:
+        """Return the parts with one of them scaled."""
+        factor = self.part_factor(values)
+        flexibility = parts.flexibility.copy()
+        flexibility[ELASTIC.index(place)] *= factor
+        contact = dict(parts.contact)
+        if place in contact:
+            flange = contact[place]
+            contact[place] = replace(
+                flange,
+                screw=factor * flange.screw,
+                approach=factor * flange.approach,
+                weight_approach=factor * flange.weight_approach,
+            )
+        return replace(parts, flexibility=flexibility, contact=contact)
+
+
+class BushingStiffness(LinkStiffness):
+    """The same of a bushing, whose flanges scale with it."""
+
+    id = "bushing_stiffness"
+    places = JOINTS
+    sentence = "the bushing of {place} gives more (or less) than modelled"
+    check = "check the bushing's material, moisture and length; swap it for a new one"
+
 
 KEYS = tuple(f"{axis}_um_per_N" for axis in "xyz") + tuple(
     f"turn_{axis}_mdeg_per_Nm" for axis in "xyz"
@@ -63,7 +113,7 @@ class MountCompliance(Law):
         alike = compliance * scale[:, :, None] * scale[:, None, :]
         return np.asarray(np.linalg.eigvalsh(alike)[..., 0] >= 0.0)
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the deflection under the wrench through the place."""
         point, compliance = _centre(at.table.geometry, place), _compliance(values)
         local = wrench_at(point, at.at_home(place, at.through_place(place)))
@@ -120,7 +170,7 @@ class DriveCompliance(Law):
     inexactness = 0.03
     own = (Parameter("compliance_mdeg_per_Nm", 0.0, 1e6, 500.0),)
 
-    def added(self, at: Situation, place: str, values: Mapping[str, float]) -> Contribution:
+    def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the turn."""
         axis = at.table.geometry.axes[MOTOR_JOINT[place]]
         torque = at.through_place(place)[:, 3:] @ axis
