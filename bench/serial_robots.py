@@ -304,7 +304,9 @@ def learned(nominal: Robot, folder: Path) -> float:
         began = time.process_time()
         result = diagnose(seen, catalogue(robot), base(robot))
         tell(robot, result, time.process_time() - began)
-        nothing = Predictor((predicted_set(result.search.base, 1.0),), (), base(robot))
+        nominal = result.search.base
+        known = predicted_set(nominal.fit, nominal.evidence, 1.0)
+        nothing = Predictor((known,), (), base(robot))
         alone, error = (
             mean_error_mm(unseen.values - each.predict(unseen))
             for each in (nothing, result.predictor)

@@ -32,7 +32,6 @@ from wrist_stiffness.identification.held_out import Judge
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.proposal import Proposals
 from wrist_stiffness.identification.proposing import propose
-from wrist_stiffness.identification.result import Fit
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
@@ -69,7 +68,7 @@ class Version:
         As it may be saved.
     held_out : dict of str to float
         Error on units that a fit has not seen, RMS by the key of the quantity (`s_um`, `phi_mdeg`).
-    fit : Fit or None
+    fit : WristFit or None
         To all recordings, with noise, discrepancy and every parameter; None where nothing was
         fitted.
     added : Effect or None
@@ -81,7 +80,7 @@ class Version:
     name: str
     model: ErrorModel
     held_out: Mapping[str, float]
-    fit: Fit | None = None
+    fit: WristFit | None = None
     added: Effect | None = None
     warnings: tuple[str, ...] = ()
 
@@ -373,7 +372,7 @@ class Analysis:
     def _fit(self, number: int = -1) -> WristFit:
         """Return what a version was fitted with; only the model as given needs a fit for it."""
         fit = self._versions[number].fit
-        return self._problem(number).begin() if fit is None else fit.fit
+        return self._problem(number).begin() if fit is None else fit
 
     @property
     def _shown(self) -> FitProblem:

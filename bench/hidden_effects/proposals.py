@@ -44,7 +44,7 @@ from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.blocks import time_blocks
+from wrist_stiffness.inference.held_out import time_blocks
 from wrist_stiffness.inference.point import Background
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -150,7 +150,7 @@ def judged(problem: WristProblem, held: Array, effects: Sequence[Effect]) -> dic
         step = np.linalg.lstsq(columns, target, rcond=None)[0]
         found[name] = float(np.sum((target - columns @ step) ** 2))
         left[name] = (fit.base.residual - change - fit.base.columns @ (fit.ratio * step))[held]
-    shown = telling(left, np.median(table.variance, axis=0), table.table.times[held])
+    shown = telling(left, np.median(table.variance, axis=0), table.observations.times[held])
     return found | {"numbers": float(rows.sum()), "shown": shown}
 
 

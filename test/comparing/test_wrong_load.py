@@ -114,7 +114,7 @@ def test_a_second_fit_no_better_than_the_first_tells_no_mistake(monkeypatch):
     """And it was asked for loads alone."""
     asked = []
     evidence = SimpleNamespace(log=-300.0, point=SimpleNamespace(left=[0.0] * 100))
-    found = SimpleNamespace(fit=SimpleNamespace(fit=SimpleNamespace(evidence=evidence)))
+    found = SimpleNamespace(fit=SimpleNamespace(evidence=evidence))
     suspicion = Suspicion(MISTAKES[0], 0.99, 0.4, "the error falls")
     monkeypatch.setattr(module, "suspicion_in", lambda *a: asked.append(a[2]) or suspicion)
     monkeypatch.setattr(module, "answering_as", lambda *_: None)

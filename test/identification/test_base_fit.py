@@ -34,7 +34,7 @@ def test_what_changes_nothing_has_no_column(model, in_the_cell):
     """Differences of equal predictions are rounding; a basis would take it for a direction."""
     settings = CellSettings(rate_hz=10.0, program_seconds=30.0, program_seed=101)
     found = fit_base(model, (as_units(model, in_the_cell(model.table, settings, 1)),))
-    length = np.linalg.norm(found.whiten(found.columns), axis=0)
+    length = np.linalg.norm(found.problem.whiten(found.columns), axis=0)
     unknowns = found.problem.unknowns
     names = [f"{found.problem.free[u.free].effect.name} {u.key}" for u in unknowns]
     # It slides link 3 along a pin: felt only where a flange of joint 4 touches.
@@ -98,7 +98,7 @@ def test_rounded_walls_lead_past_the_pins_that_turn_over(model, in_the_cell):
         effect("joint_friction", "joint_2", coefficient=0.1),
     ]
     sharp = fit_base(model, units, extras, base)
-    found = fit_base(model, units, extras, base, walls="rounded first")
+    found = fit_base(model, units, extras, base, gradually=True)
     assert found.cost < 0.5 * sharp.cost
     # What is handed on is play as it is.
     assert all(each.law is find_law(each.law.id) for each in found.effects(0))

@@ -54,10 +54,8 @@ def found(model, sessions):
     units = tuple(as_units(model, each) for each in sessions)
     whole, _ = fit_cleaned(FitProblem(model, units, tuple(free)))
     judge = Judge(whole)
-    fitted, _ = fit_cleaned(replace(whole.problem, sessions=judge.parts.seen))
-    return SimpleNamespace(
-        by=judge.by, aside=judge.parts.aside, fit=fitted, left=judge.left(fitted)
-    )
+    fitted, _ = fit_cleaned(replace(whole.problem, sessions=judge.seen))
+    return SimpleNamespace(by=judge.by, aside=judge.aside, fit=fitted, left=judge.left(fitted))
 
 
 def stiffness(result):

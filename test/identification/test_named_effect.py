@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.identification.free_effects import free_all
-from wrist_stiffness.identification.result import Fit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
@@ -39,7 +38,7 @@ def base_of(model, hidden):
 def found_beside(problem, effect):
     """Return the parameters of a named effect beside that base, by key."""
     grown = problem.extended(problem.begin(), effect)
-    return {p.key: p for p in Fit(grown.settled(), 0).parameters if p.effect == effect.name}
+    return {p.key: p for p in grown.settled().parameters if p.effect == effect.name}
 
 
 def agrees(found, size):

@@ -20,7 +20,7 @@ LAW = "joint_friction"
 def point(model, in_the_cell):
     settings = CellSettings(rate_hz=10.0, program_seconds=30.0, program_seed=41, base="exact")
     base = fit_base(model, (as_units(model, in_the_cell(model.table, settings, 3)),))
-    return Point((base.model(0),), tuple(each.measured for each in base.problem.sessions))
+    return Point((base.model(0),))
 
 
 @pytest.fixture
@@ -60,5 +60,5 @@ def test_a_sticky_law_of_ones_own_has_the_columns_and_starts_of_ours(point, as_a
         for shape in one.shapes:
             columns = one.at(shape)
             assert np.allclose(other.at(shape), columns, rtol=0.0, atol=1e-9 * abs(columns).max())
-            starts = [e.effect({"coefficient": 0.2}, shape).estimates for e in (one, other)]
+            starts = [e.effect(0.2 / e.usual, shape).estimates for e in (one, other)]
             assert starts[0] == starts[1]

@@ -15,7 +15,8 @@ from wrist_stiffness.comparing.wiring import told_mistake
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate
 from wrist_stiffness.identification.free_effects import unfitted
-from wrist_stiffness.identification.result import Fit, FittedParameter
+from wrist_stiffness.identification.result import FittedParameter
+from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -92,7 +93,7 @@ def writable(output: str | Path) -> Path:
 
 
 def fit_values(
-    fit: Fit,
+    fit: WristFit,
     before: Mapping[str, float],
     after: Mapping[str, float],
     judged_by: str,

@@ -23,7 +23,7 @@ from wrist_stiffness.identification.calibration import Calibration, calibrate, s
 from wrist_stiffness.identification.free_effects import answering_as
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.inference.noise import replicate_variance
-from wrist_stiffness.inference.settings import FEWEST_UNITS
+from wrist_stiffness.inference.outliers import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -164,7 +164,7 @@ def doubts_load(found: Calibration) -> bool:
 
 def _gain(before: Calibration, after: Calibration) -> float:
     """Return the gain of log evidence; under another load other units may lie in the range."""
-    found = [each.fit.fit.evidence for each in (before, after)]
+    found = [each.fit.evidence for each in (before, after)]
     counts = [len(each.point.left) for each in found]
     first, second = (each.log / count for each, count in zip(found, counts, strict=True))
     return (second - first) * min(counts)

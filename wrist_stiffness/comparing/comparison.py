@@ -14,7 +14,7 @@ from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import as_values, percent
 from wrist_stiffness.identification.questions import LOAD
 from wrist_stiffness.inference import Observations, Quantity
-from wrist_stiffness.inference.blocks import time_blocks
+from wrist_stiffness.inference.held_out import time_blocks
 from wrist_stiffness.mechanism.components import Array
 
 JUDGES = 12

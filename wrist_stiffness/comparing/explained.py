@@ -10,12 +10,12 @@ import numpy as np
 from scipy.special import ndtr
 
 from wrist_stiffness.comparing.curve import Curve, curve_of
-from wrist_stiffness.identification.likelihood import WristTable, unstated
+from wrist_stiffness.identification.likelihood import WristTable
 from wrist_stiffness.identification.questions import finer_questions
 from wrist_stiffness.inference.answer import NAMING
-from wrist_stiffness.inference.blocks import time_blocks
 from wrist_stiffness.inference.dependence import Dependences, dependences
 from wrist_stiffness.inference.discrepancy import PASSING_DRIFT
+from wrist_stiffness.inference.held_out import time_blocks
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.point import Group, Point
 from wrist_stiffness.mechanism.components import Array
@@ -278,7 +278,7 @@ def explain(
     number counted in the fit; `prior` (p,): weights of the priors of the parameters in that fit, by
     default 1.
     """
-    table = WristTable(left, sessions, unstated(left, left.values, columns), finer_questions)
+    table = WristTable(left, sessions, columns, finer_questions)
     white = table.whiten(left.values)
     prior = np.ones(len(z)) if prior is None else prior
     point = Point(white, table.whiten(columns), z, prior, {}, np.zeros((len(white), 0)))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -19,12 +18,9 @@ from wrist_stiffness.identification.free_effects import (
     commissioning,
     within_tolerances,
 )
-from wrist_stiffness.identification.parts import parted
 from wrist_stiffness.identification.problem import FitProblem
-from wrist_stiffness.identification.questions import questions
-from wrist_stiffness.inference.observations import Observations
-from wrist_stiffness.inference.outliers import lost_units
-from wrist_stiffness.inference.settings import OUTLIER_LIMIT
+from wrist_stiffness.identification.questions import smooth_columns
+from wrist_stiffness.inference.outliers import OUTLIER_LIMIT, lost_units
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -58,8 +54,6 @@ ROUNDED_N = (1.0, 0.3, 0.1, 0.03)
 wall to the other the sum of squares has a minimum for every pin that turns over, and steps end in
 the next one (graduated non-convexity, Blake and Zisserman 1987)."""
 
-Walls = Literal["sharp", "rounded first", "rounded"]
-
 Base = tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]
 """What of a model is free, and what stays as it is."""
 
@@ -68,39 +62,27 @@ MEDIAN_CHI2 = float(chdtri(1, 0.5))
 
 @dataclass(frozen=True, eq=False)
 class BaseFit:
-    """The base at its best, with further effects where some were fitted along.
+    """The base at its best, with further effects where some were fitted along."""
 
-    Parameters
-    ----------
-    problem : FitProblem
-        What was free.
-    z : (p,) float
-        Steps from the prior means.
-    residual : (u, 6) float
-        What is left, log(T_measured T_predicted^-1) at O in F [m, rad].
-    extras : tuple of str
-        Names of the further effects.
-    cost : float
-        Weighted sum of squares with the priors' part, in units of the noise.
-    bare : FitProblem
-        The base alone.
-    firm : FitProblem
-        The base with those extras beside which its columns are taken.
-    arrived : bool
-        Whether the steps settled.
-    columns : (u, 6, p) float
-        Change of what is left by a step of each unknown [m, rad], from where the last step began.
-    """
-
-    problem: FitProblem
-    z: Array
-    residual: Array
-    extras: tuple[str, ...]
-    cost: float
-    bare: FitProblem
-    firm: FitProblem
-    arrived: bool
+    problem: FitProblem  # what was free
+    z: Array  # (p,), steps from the prior means
+    residual: Array  # (u, 6), what is left, log(T_measured T_predicted^-1) at O in F [m, rad]
+    # (u, 6, p), change of what is left by a step of each unknown [m, rad], from where the last step
+    # began
     columns: Array
+    arrived: bool  # whether the steps settled
+    bare: FitProblem  # the base alone
+    firm: FitProblem  # the base with those extras beside which its columns are taken
+
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """Names of the further effects."""
+        return tuple(free.effect.name for free in self.problem.free[len(self.bare.free) :])
+
+    @property
+    def cost(self) -> float:
+        """Weighted sum of squares with the priors' part, in units of the noise."""
+        return _cost(self.problem.whiten(self.residual), self.z, self.problem.weights, 1.0)
 
     def with_columns_here(self) -> BaseFit:
         """Return the fit with the columns of the very point where it ended."""
@@ -123,8 +105,8 @@ class BaseFit:
         for place, free in enumerate(self.problem.free[usual:], usual):
             # On a bound the way to steps and back rounds beyond it.
             values = {
-                u.key: float(np.clip(u.mean + z * u.step, u.lower, u.upper))
-                for u, z in zip(self.problem.unknowns, self.z, strict=True)
+                u.key: u.value(z)
+                for u, z in zip(self.problem.unknowns, self.z.tolist(), strict=True)
                 if u.free == place
             }
             found[free.effect.name] = free.effect.with_values(values)
@@ -133,25 +115,17 @@ class BaseFit:
     @property
     def variance(self) -> float:
         """Mean square of what is left, in units of the noise."""
-        white = self.whiten(self.residual)
+        white = self.problem.whiten(self.residual)
         return float(white @ white) / np.count_nonzero(self.problem.table.measured)
 
-    def effects(self, session: int, with_extras: bool = True) -> tuple[Effect, ...]:
+    def effects(self, session: int) -> tuple[Effect, ...]:
         """Return the fitted effects of one session, also those that were held."""
-        own = self.problem.effects(self.z, session)
-        usual = {each.effect.name for each in self.bare.free}
-        kept = [e for e in own if with_extras or e.name not in self.extras or e.name in usual]
-        return (*self.problem.model.effects, *kept)
+        return (*self.problem.model.effects, *self.problem.effects(self.z, session))
 
-    def model(self, session: int, with_extras: bool = True) -> SessionModel:
+    def model(self, session: int) -> SessionModel:
         """Return the fitted model of one session, on its units."""
         problem = self.problem
-        effects = self.effects(session, with_extras)
-        return SessionModel(problem.model, problem.sessions[session], effects)
-
-    def whiten(self, values: Array) -> Array:
-        """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
-        return self.problem.whiten(values)
+        return SessionModel(problem.model, problem.sessions[session], self.effects(session))
 
 
 def free_base(model: ErrorModel) -> Base:
@@ -165,10 +139,9 @@ def fit_base(
     sessions: tuple[UnitSession, ...],
     extras: Sequence[Effect] = (),
     start: BaseFit | None = None,
-    beside: bool = False,
-    walls: Walls = "sharp",
     base: Base | None = None,
     quickly: bool = False,
+    gradually: bool = False,
 ) -> BaseFit:
     """Fit registrations, zeros, tare and tolerances, within their priors.
 
@@ -184,16 +157,14 @@ def fit_base(
         One that belongs to the base comes on top of what the wrist was built with.
     start : BaseFit, optional
         Where the base begins.
-    beside : bool
-        Whether the base's columns are taken beside play too; else as if no play were there, which
-        is far quicker and leads nearly as far.
-    walls : {"sharp", "rounded first", "rounded"}
-        Whether pins go from wall to wall little by little first, and whether they stay so: enough
-        to tell which of several fits leads furthest.
     base : (tuple of FreeEffect, tuple of Effect), optional
         What of the model is free and what stays as it is; by default as `free_base` says.
     quickly : bool
         Whether the columns of the base's start serve to the end: nearly as far, far quicker.
+    gradually : bool
+        Whether pins go from wall to wall little by little first, and the base's columns are taken
+        beside play too; else as if no play were there, which is far quicker and leads nearly as
+        far.
     """
     free, held = base or free_base(model)
     # What was fitted with rounded walls begins with its own law again.
@@ -203,67 +174,61 @@ def fit_base(
     # Those on top of the base follow it, and play comes last.
     ordered = sorted(added.values(), key=lambda e: (e.law.state_is_a_guess, e.name not in usual))
     more = [_about_zero(each) for each in ordered]
-    firm = len(ordered) if beside else sum(not each.law.state_is_a_guess for each in ordered)
-    whole = model.with_effects(*held)
-    alone = FitProblem(whole, sessions, free)
-    if start is not None and start.bare.same_as(alone):
+    alone = FitProblem(model.with_effects(*held), sessions, free)
+    same = start is not None and start.bare.same_as(alone)
+    if start is not None and same:
         alone = start.bare
     problem = replace(alone, free=(*free, *more))
-    bare = problem if firm == len(more) else alone
-    if 0 < firm < len(more):
-        bare = replace(alone, free=(*free, *more[:firm]))
-    z, near = _start(problem, start, added), None
-    if start is not None and alone is start.bare:
-        near = _near(problem, start, len(free))
-    if walls != "sharp":
-        for force in ROUNDED_N:
-            gradual = [replace(each, effect=_rounded(each.effect, force)) for each in more]
-            easy = replace(problem, free=(*free, *gradual))
-            z, residual, near, arrived = _descended(easy, easy, z, len(free), NEARLY, near)
-            if walls == "rounded":
-                cost = _cost(easy.whiten(residual), z, easy.weights, 1.0)
-                return BaseFit(easy, z, residual, tuple(added), cost, alone, easy, arrived, near)
+    count = len(ordered) if gradually else sum(not e.law.state_is_a_guess for e in ordered)
+    firm = problem if count == len(more) else alone
+    if 0 < count < len(more):
+        firm = replace(alone, free=(*free, *more[:count]))
+    z = _start(problem, start, added)
+    near = _near(problem, start, len(free)) if start is not None and same else None
+    for force in ROUNDED_N if gradually else ():
+        rounded = [replace(each, effect=_rounded(each.effect, force)) for each in more]
+        easy = replace(problem, free=(*free, *rounded))
+        found = _descended(easy, alone, easy, z, NEARLY, near)
+        z, near = found.z, found.columns
     enough = NEARLY if quickly else ENOUGH
-    z, residual, near, arrived = _descended(problem, bare, z, len(free), enough, near, quickly)
-    cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
-    return BaseFit(problem, z, residual, tuple(added), cost, alone, bare, arrived, near)
+    return _descended(problem, alone, firm, z, enough, near, quickly)
 
 
 def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFit, int]:
     """Fit a problem as it stands, without units that no smooth law could explain: lost beams.
 
-    Parameters
-    ----------
-    problem : FitProblem
-        What is free.
-    start : (p,) float, optional
-        Where to begin, in steps; by default at the means of the priors.
-
-    Returns
-    -------
-    BaseFit
-        Its problem lacks those units.
-    int
-        How many there were.
+    `problem`: what is free; `start` (p,): where to begin, in steps; by default at the means of the
+    priors.
+    Returns the fit, whose problem lacks those units, and how many there were.
     """
     if start is None:
-        _, start = _led(_few(problem), np.zeros(len(problem.unknowns)))
-    usual, total = len(problem.free), 0
-    z, residual, columns, arrived = _descended(problem, problem, start, usual)
+        start = _led(_few(problem), np.zeros(len(problem.unknowns))).z
+    found, total = _descended(problem, problem, problem, start), 0
     for _ in range(MOST_CLEANINGS):
-        table = problem.table.with_values(residual)
+        table = problem.table.with_values(found.residual)
         # Exact data scatter by rounding: what is lost is far beyond the noise as well.
-        white = problem.whiten(residual).reshape(table.values.shape)
-        lost = _lost(table, columns)
+        white = problem.whiten(found.residual).reshape(table.values.shape)
+        beside = [smooth_columns(table), *([] if table.common is None else [table.common])]
+        everything = np.concatenate([found.columns, *beside], axis=2)
+        lost = lost_units(table, everything, OUTLIER_LIMIT)
         lost &= np.abs(white).max(axis=1) > OUTLIER_LIMIT
         if not lost.any():
             break
         total += int(lost.sum())
-        problem = replace(problem, sessions=parted(problem.sessions, lost).seen)
-        known = columns[~lost]
-        z, residual, columns, arrived = _descended(problem, problem, z, usual, near=known)
-    cost = _cost(problem.whiten(residual), z, problem.weights, 1.0)
-    return BaseFit(problem, z, residual, (), cost, problem, problem, arrived, columns), total
+        problem = replace(problem, sessions=without_units(problem.sessions, lost))
+        found = _descended(problem, problem, problem, found.z, near=found.columns[~lost])
+    return found, total
+
+
+def without_units(sessions: tuple[UnitSession, ...], aside: Mask) -> tuple[UnitSession, ...]:
+    """Return sessions as if nothing had been measured in some units (u,) of all measured ones."""
+    parts, start = [], 0
+    for each in sessions:
+        rows = np.flatnonzero(each.measured)
+        own = rows[aside[start : start + len(rows)]]
+        start += len(rows)
+        parts.append(each.without(own))
+    return tuple(parts)
 
 
 def best_valley(problem: FitProblem) -> Array:
@@ -276,14 +241,12 @@ def best_valley(problem: FitProblem) -> Array:
     few = _few(problem)
     found = [_led(few, np.zeros(len(few.unknowns)))]
     for place, unknown in enumerate(few.unknowns):
-        effect = few.free[unknown.free].effect
-        linear = next(p.linear for p in effect.parameters if p.key == unknown.key)
-        if not (linear or effect.law.smooth):
+        if not (unknown.parameter.linear or unknown.effect.law.smooth):
             for side in (-ELSEWHERE, ELSEWHERE):
-                start = found[0][1].copy()
+                start = found[0].z.copy()
                 start[place] = side
                 found.append(_led(few, np.clip(start, *few.bounds)))
-    return min(found, key=lambda each: each[0])[1]
+    return min(found, key=lambda each: each.cost).z
 
 
 def _few(problem: FitProblem) -> FitProblem:
@@ -291,21 +254,9 @@ def _few(problem: FitProblem) -> FitProblem:
     return replace(problem, sessions=tuple(s.thinned(BEGUN_WITH) for s in problem.sessions))
 
 
-def _led(problem: FitProblem, start: Array) -> tuple[float, Array]:
-    """Return the cost where steps end nearly, and that place."""
-    z, residual, _, _ = _descended(problem, problem, start, len(problem.free), NEARLY)
-    return _cost(problem.whiten(residual), z, problem.weights, 1.0), z
-
-
-def _lost(table: Observations, columns: Array) -> Mask:
-    """Return which units lie far from a base and every smooth law of the conditions, (u,)."""
-    common = np.empty((*table.values.shape, 0)) if table.common is None else table.common
-    asked = [each.features(table.covariates) for each in questions(table.covariates)]
-    found = [each for each in asked if each is not None]
-    smooth = np.concatenate([np.zeros((table.n_units, 0)), *found], axis=1)
-    spread = smooth[:, None, :, None] * np.eye(table.n_components)[:, None, :]
-    beside = spread.reshape(*table.values.shape, -1)
-    return lost_units(table, np.concatenate([columns, beside, common], axis=2), OUTLIER_LIMIT)
+def _led(problem: FitProblem, start: Array) -> BaseFit:
+    """Return where steps end nearly."""
+    return _descended(problem, problem, problem, start, NEARLY)
 
 
 def has_walls(effect: Effect) -> bool:
@@ -325,18 +276,18 @@ def _rounded(effect: Effect, force: float | None) -> Effect:
 def _descended(
     problem: FitProblem,
     bare: FitProblem,
+    firm: FitProblem,
     z: Array,
-    usual: int,
     enough: float = ENOUGH,
     near: Array | None = None,
     kept: bool = False,
-) -> tuple[Array, Array, Array, bool]:
-    """Return where Gauss-Newton steps lead from `z`: there, the residual, columns, if they settled.
+) -> BaseFit:
+    """Return where Gauss-Newton steps lead from `z`.
 
-    Columns of the `usual` first effects, the base, cost by far the most and hardly change about a
-    fit: those of `near` (u, 6, p), where there is one, serve until they lead no further.  The end
-    is after a step with all columns of the very point where it began that gains next to nothing;
-    where these are `kept`, it is where they lead no further.
+    Columns of the base cost by far the most and hardly change about a fit: those of `near`
+    (u, 6, p), where there is one, serve until they lead no further.  The end is after a step with
+    all columns of the very point where it began that gains next to nothing; where these are `kept`,
+    it is where they lead no further.
     """
     lower, upper = problem.bounds
     weights = problem.weights
@@ -344,7 +295,7 @@ def _descended(
     scale, columns = 0.0, near
     for _ in range(MOST_STEPS):
         fresh = columns is None
-        columns = _columns(problem, bare, z, columns, usual)
+        columns = _columns(problem, firm, z, columns, len(bare.free))
         left = problem.whiten(residual)
         found = _robust_variance(left)
         scale = max(found, COOLING * scale)
@@ -363,35 +314,28 @@ def _descended(
             z, residual = trial, tried
         small = cooled and before - after < enough * before
         if small and (fresh or kept):
-            return z, residual, columns, True
+            return BaseFit(problem, z, residual, columns, True, bare, firm)
         if small or near is None:
             columns = None
-    return z, residual, _columns(problem, bare, z), False
+    return BaseFit(problem, z, residual, _columns(problem, firm, z), False, bare, firm)
 
 
 def _columns(
-    problem: FitProblem, bare: FitProblem, z: Array, near: Array | None = None, usual: int = 0
+    problem: FitProblem, firm: FitProblem, z: Array, near: Array | None = None, usual: int = 0
 ) -> Array:
     """Return the columns of one problem, and of what another has on top of it, (u, 6, p).
 
     Play would be solved again for each column of the base.
 
-    Parameters
-    ----------
-    problem, bare : FitProblem
-        The whole, and the one beside which columns of its own unknowns are taken.
-    z : (p,) float
-        Where.
-    near : (u, 6, p) float, optional
-        Columns of a point near by: those of the first `usual` free effects are taken from there.
-    usual : int
-        How many.
+    `problem`, `firm`: the whole, and the one beside which columns of its own unknowns are taken;
+    `z` (p,): where; `near` (u, 6, p): columns of a point near by: those of the first `usual` free
+    effects are taken from there; `usual`: how many.
     """
-    of_bare = [n for n, u in enumerate(problem.unknowns) if u.free < len(bare.free)]
-    beyond = [n for n in range(len(z)) if n not in set(of_bare)]
+    of_firm = [n for n, u in enumerate(problem.unknowns) if u.free < len(firm.free)]
+    beyond = [n for n in range(len(z)) if n not in set(of_firm)]
     columns = np.zeros((*problem.table.values.shape, len(z))) if near is None else near.copy()
-    asked = tuple(i for i, u in enumerate(bare.unknowns) if near is None or u.free >= usual)
-    for of, own, places in ((bare, of_bare, asked), (problem, range(len(z)), tuple(beyond))):
+    asked = tuple(i for i, u in enumerate(firm.unknowns) if near is None or u.free >= usual)
+    for of, own, places in ((firm, of_firm, asked), (problem, range(len(z)), tuple(beyond))):
         if places:
             at = [own[place] for place in places]
             columns[:, :, at] = of.columns_at(z[own], places if len(places) < len(own) else None)
@@ -418,13 +362,12 @@ def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effec
     known: dict[tuple[str, str, int | None, bool], float] = {}
     if start is not None:
         known = {
-            (start.problem.free[u.free].effect.name, u.key, u.session, bool(of_base)): u.mean
-            + z * u.step
+            (u.effect.name, u.key, u.session, bool(of_base)): u.mean + z * u.step
             for u, z, of_base in zip(start.problem.unknowns, start.z, start.of_base, strict=True)
         }
     found = []
     for u in problem.unknowns:
-        name, of_base = problem.free[u.free].effect.name, u.free < usual
+        name, of_base = u.effect.name, u.free < usual
         at = u.mean if of_base else added[name].estimates[u.key].value
         found.append((known.get((name, u.key, u.session, of_base), at) - u.mean) / u.step)
     return np.array(found)

@@ -12,7 +12,7 @@ from wrist_stiffness.identification.free_effects import commissioning, unfitted
 from wrist_stiffness.identification.held_out import Judge
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem, require_units
-from wrist_stiffness.identification.result import Fit, FittedParameter
+from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -34,26 +34,15 @@ CALIBRATED = "calibrated"
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A model fitted to a wrist as it was set up last.
+    """A model fitted to a wrist as it was set up last."""
 
-    Parameters
-    ----------
-    fit : Fit
-        To all recordings.
-    before, after : dict of str to float
-        Error of the model as it stood and of a calibrated one on the units that judge, RMS by the
-        key of the quantity.
-    judged_by : str
-        See `judge`.
-    calibrated : tuple of str
-        Ids of effects that the recordings say need no fit.
-    """
-
-    fit: Fit
+    fit: WristFit  # to all recordings
+    # error of the model as it stood and of a calibrated one on the units that judge, RMS by the key
+    # of the quantity
     before: Mapping[str, float]
     after: Mapping[str, float]
-    judged_by: str
-    calibrated: tuple[str, ...]
+    judged_by: str  # see `judge`
+    calibrated: tuple[str, ...]  # ids of effects that the recordings say need no fit
 
     @cached_property
     def parameters(self) -> tuple[FittedParameter, ...]:
@@ -114,7 +103,7 @@ def calibrate(
     found = fitted(first, lost)
     progress(2, STEPS)
     judge = Judge(first)
-    after = judge.left(fit_cleaned(replace(problem, sessions=judge.parts.seen), first.z)[0])
+    after = judge.left(fit_cleaned(replace(problem, sessions=judge.seen), first.z)[0])
     before = judge.of_model(model)
     progress(STEPS, STEPS)
     reported = first.problem.table.reported
@@ -127,18 +116,15 @@ def calibrate(
     )
 
 
-def fitted(base: BaseFit, lost: int) -> Fit:
+def fitted(base: BaseFit, lost: int) -> WristFit:
     """Return what is known after a fit without effects beside it."""
-    return Fit(WristFit(base, likelihood_of(base)).settled(), lost)
+    return WristFit(base, likelihood_of(base, lost)).settled()
 
 
 def said_calibrated(sessions: Sequence[MeasuredSession]) -> tuple[str, ...]:
     """Return the ids of effects that every recording says were calibrated otherwise.
 
-    Raises
-    ------
-    InputError
-        If a note is no list of names.
+    Raises `InputError` if a note is no list of names.
     """
     said = []
     for session in sessions:
@@ -149,7 +135,7 @@ def said_calibrated(sessions: Sequence[MeasuredSession]) -> tuple[str, ...]:
     return tuple(sorted(set.intersection(*said))) if said else ()
 
 
-def told_model(found: Fit, keep: Sequence[str] = ()) -> ErrorModel:
+def told_model(found: WristFit, keep: Sequence[str] = ()) -> ErrorModel:
     """Return a fitted model as it is written, of the newest session.
 
     An effect of which the data say nothing is left out where it stayed at nothing, unless it is

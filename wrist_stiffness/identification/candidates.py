@@ -32,27 +32,12 @@ Trial = tuple[Law, str, Values]
 
 @dataclass(frozen=True, eq=False)
 class WristCandidate:
-    """A law at a place, its recipe, and its columns on all points of its grid.
+    """A law at a place, its recipe, and its columns on all points of its grid."""
 
-    Parameters
-    ----------
-    law : Law
-        The physics.
-    place : str
-        Component.
-    recipe : Recipe
-        How it became columns.
-    known : dict of shape to (u, 6, k) arrays
-        Columns on the grid [m, rad].
-    exact : callable, optional
-        shape -> columns, where they are known between the points of the grid.
-    """
-
-    law: Law
-    place: str
-    recipe: Recipe
-    known: Mapping[Shape, Array]
-    exact: Callable[[Shape], Array] | None = None
+    law: Law  # the physics
+    place: str  # component
+    recipe: Recipe  # how it became columns
+    at: Callable[[Shape], Array]  # columns (u, 6, k) of all units at a point of the grid [m, rad]
 
     @property
     def name(self) -> str:
@@ -64,21 +49,11 @@ class WristCandidate:
         """Every point of the grid."""
         return self.recipe.shapes
 
-    def effect(self, found: Mapping[str, float], shape: Shape) -> Effect:
-        """Return the effect with which a fit may begin.
-
-        Parameters
-        ----------
-        found : dict of str to float
-            Factors of the columns by their names.
-        shape : tuple of float
-            Values of the shape parameters.
-        """
+    def effect(self, z: Array, shape: Shape) -> Effect:
+        """Return the effect with which a fit may begin, its factors (k,) in usual sizes."""
+        names = [column.factor.key for column in self.recipe.columns(shape)]
+        found = dict(zip(names, (z * self.usual).tolist(), strict=True))
         return effect_at(self.law, self.place, self.recipe.start(found, shape))
-
-    def at(self, shape: Shape) -> Array:
-        """Return the columns of all units at a point of the grid, (u, 6, k)."""
-        return self.exact(shape) if self.exact else self.known[shape]
 
     @property
     def usual(self) -> Array:
@@ -116,14 +91,7 @@ def possible(law: Law, parameters: tuple[Parameter, ...]) -> Possible:
 def compensable(law: Law, place: str, points: bool = True) -> str:
     """Tell whether the motors can correct for an effect: `yes`, `needs_signal` or `no`.
 
-    Parameters
-    ----------
-    law : Law
-        The physics.
-    place : str
-        Component.
-    points : bool
-        Whether it turns the platform's normal.
+    `law`: the physics; `place`: component; `points`: whether it turns the platform's normal.
     """
     if law.of_measurement(place) or not points:
         return "no"
@@ -133,12 +101,8 @@ def compensable(law: Law, place: str, points: bool = True) -> str:
 def turns_normal(columns: Array, normal: Array) -> bool:
     """Tell whether any of the columns turns the platform's normal.
 
-    Parameters
-    ----------
-    columns : (u, 6, k) float
-        Twists at O in F [m, rad].
-    normal : (u, 3) float
-        Of the platform, unit vectors in F.
+    `columns` (u, 6, k): twists at O in F [m, rad]; `normal` (u, 3): of the platform, unit vectors
+    in F.
     """
     turned = np.cross(columns[:, 3:], normal[:, :, None], axis=1)
     lengths = [np.linalg.norm(each, axis=(0, 1)) for each in (turned, columns[:, :3])]
@@ -147,18 +111,9 @@ def turns_normal(columns: Array, normal: Array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Where columns are taken: the base of each session on its units.
+    """Where columns are taken: the base of each session on its units."""
 
-    Parameters
-    ----------
-    models : tuple of SessionModel
-        With the effects of the base.
-    used : tuple of (u,) bool
-        Units of each session that are in the table.
-    """
-
-    models: tuple[SessionModel, ...]
-    used: tuple[Mask, ...]
+    models: tuple[SessionModel, ...]  # with the effects of the base
 
     @property
     def signals(self) -> frozenset[str]:
@@ -169,24 +124,19 @@ class Point:
     def changes(self, trials: Sequence[Trial]) -> Array:
         """Return the change of what the instrument shows by each trial, (t, u, m) [m, rad].
 
-        Parameters
-        ----------
-        trials : sequence of (Law, str, dict)
-            A law at a place with values of its parameters; an effect that the base has already
-            gets these values on top of its own.
+        `trials`: a law at a place with values of its parameters; an effect that the base has
+        already gets these values on top of its own.
         """
         blocks = []
-        for model, rows in zip(self.models, self.used, strict=True):
-            sets = [_with(model.effects, *trial) for trial in trials]
+        for model in self.models:
+            sets, rows = [_with(model.effects, *t) for t in trials], model.session.measured
             found = np.stack(model.changes(sets)) if sets else np.empty((0, len(rows), 6))
             blocks.append(np.nan_to_num(model.session.seen(found)[:, rows]))
         return np.concatenate(blocks, axis=1)
 
     def mean(self, signal: Callable[[SessionModel], Array]) -> Array:
         """Return a signal of each unit of the table, (u, ...)."""
-        return np.concatenate(
-            [signal(m)[rows] for m, rows in zip(self.models, self.used, strict=True)]
-        )
+        return np.concatenate([signal(each)[each.session.measured] for each in self.models])
 
 
 def searched(absent: Collection[str]) -> list[tuple[Law, str]]:
@@ -203,17 +153,8 @@ def searched(absent: Collection[str]) -> list[tuple[Law, str]]:
 def wrist_candidates(point: Point, asked: Sequence[tuple[Law, str]]) -> tuple[WristCandidate, ...]:
     """Evaluate laws at places about a point.
 
-    Parameters
-    ----------
-    point : Point
-        The base.
-    asked : sequence of (Law, str)
-        Laws with a component each.
-
-    Raises
-    ------
-    InputError
-        If a law of another package does not say how large it usually is.
+    `point`: the base; `asked`: laws with a component each.
+    Raises `InputError` if a law of another package does not say how large it usually is.
     """
     signals = point.signals
     plans = [(law, place, law.linearised(place, signals)) for law, place in asked]
@@ -243,7 +184,7 @@ def wrist_candidates(point: Point, asked: Sequence[tuple[Law, str]]) -> tuple[Wr
         if own.carried:
             carrier = changes[index(find_law(own.carried.law), place, own.carried.values)]
             exact = _times_signals(point, carrier, own.carried)
-            found.append(WristCandidate(law, place, own, {}, exact))
+            found.append(WristCandidate(law, place, own, exact))
             continue
         known = {}
         for shape in own.shapes:
@@ -254,7 +195,7 @@ def wrist_candidates(point: Point, asked: Sequence[tuple[Law, str]]) -> tuple[Wr
                     change = change - changes[index(law, place, column.origin)]
                 stack.append(change / column.size)
             known[shape] = np.stack(stack, axis=-1)
-        found.append(WristCandidate(law, place, own, known))
+        found.append(WristCandidate(law, place, own, known.__getitem__))
     return tuple(found)
 
 

@@ -16,7 +16,7 @@ from wrist_stiffness.identification.free_effects import (
 )
 from wrist_stiffness.identification.held_out import Judge
 from wrist_stiffness.identification.problem import FitProblem, require_units
-from wrist_stiffness.identification.result import Fit, FittedParameter
+from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
@@ -43,28 +43,15 @@ MOST_FAR = 3
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """A model with one more effect.
+    """A model with one more effect."""
 
-    Parameters
-    ----------
-    effect : Effect
-        What was added, as it was given.
-    fit : Fit
-        Of everything together, to all recordings.
-    without : WristFit
-        Without the effect, where its first steps ended.
-    before, after : HeldOut
-        Without and with the effect, of units that neither fit has seen.
-    judged_by : str
-        Which those are.
-    """
-
-    effect: Effect
-    fit: Fit
-    without: WristFit
+    effect: Effect  # what was added, as it was given
+    fit: WristFit  # of everything together, to all recordings
+    without: WristFit  # without the effect, where its first steps ended
+    # without and with the effect, of units that neither fit has seen
     before: HeldOut
     after: HeldOut
-    judged_by: str
+    judged_by: str  # which those are
 
     @cached_property
     def model(self) -> ErrorModel:
@@ -77,9 +64,9 @@ class Extension:
         return self.fit.parameters
 
     @cached_property
-    def base(self) -> Fit:
+    def base(self) -> WristFit:
         """Fit without the effect, to all recordings."""
-        return Fit(self.without.settled(), self.fit.lost)
+        return self.without.settled()
 
     @property
     def own(self) -> tuple[FittedParameter, ...]:
@@ -92,7 +79,7 @@ class Extension:
 
         It says nothing of an effect without a typical magnitude, such as a formula's.
         """
-        return self.fit.fit.evidence.log - self.base.fit.evidence.log
+        return self.fit.evidence.log - self.base.evidence.log
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -202,10 +189,10 @@ def extend(
     progress(1, STEPS)
     grown = problem.extended(base, effect)
     progress(2, STEPS)
-    found = Fit(grown.settled(), problem.lost)
+    found = grown.settled()
     progress(3, STEPS)
     judge = Judge(base.base)
-    seen, own = judge.parts.seen, list(grown.base.beyond().values())
+    seen, own = judge.seen, list(grown.base.beyond().values())
     before = judge.left(fit_base(model, seen, (), base.base, base=(free, held)))
     after = judge.left(fit_base(model, seen, own, base.base, base=(others, held)))
     progress(4, STEPS)

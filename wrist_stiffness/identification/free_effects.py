@@ -22,22 +22,13 @@ EVENLY_SPREAD = 1.0 / math.sqrt(3.0)
 
 @dataclass(frozen=True)
 class FreeEffect:
-    """An effect whose parameters are fitted.
+    """An effect whose parameters are fitted."""
 
-    Parameters
-    ----------
-    effect : Effect
-        Its values are the start and the mean of the prior.
-    scale : dict of str to float
-        Standard deviation of the prior of each parameter that is free, in the unit of its name;
-        infinite for none.  A parameter that is left out keeps its value.
-    per_session : bool
-        Whether every session has values of its own.
-    """
-
-    effect: Effect
+    effect: Effect  # its values are the start and the mean of the prior
+    # standard deviation of the prior of each parameter that is free, in the unit of its name;
+    # infinite for none.  A parameter that is left out keeps its value
     scale: Mapping[str, float] = field(default_factory=dict)
-    per_session: bool = False
+    per_session: bool = False  # whether every session has values of its own
 
     @property
     def step(self) -> dict[str, float]:
@@ -54,38 +45,15 @@ def free_all(effect: Effect, per_session: bool = False) -> FreeEffect:
     return FreeEffect(effect, scale, per_session)
 
 
-def refitted(effect: Effect) -> FreeEffect:
-    """Return an effect of a model with those parameters free that a fit has estimated before.
-
-    A parameter without an uncertainty is believed as it stands.
-    """
-    scale = {
-        parameter.key: parameter.scale
-        for parameter in effect.parameters
-        if effect.estimates[parameter.key].sigma > 0.0
-    }
-    return FreeEffect(effect, scale)
-
-
 def commissioning(
     model: ErrorModel, calibrated: Sequence[str] = ()
 ) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
     """Return what is always refitted, and what of the model stays as it is.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Its effects are starts where they are among those that are refitted.
-    calibrated : sequence of str
-        Ids of effects that the recordings say were calibrated otherwise.
-
-    Returns
-    -------
-    tuple of FreeEffect
-        Registrations, zeros and tare of each session; tolerances of the wrist; and every further
-        effect of the model that was estimated.
-    tuple of Effect
-        The others.
+    `model`: its effects are starts where they are among those that are refitted; `calibrated`: ids
+    of effects that the recordings say were calibrated otherwise.
+    The former are registrations, zeros and tare of each session; tolerances of the wrist; and every
+    further effect of the model that was estimated.
     """
     own = {effect.name: effect for effect in model.effects}
     free: dict[str, FreeEffect] = {}
@@ -99,8 +67,11 @@ def commissioning(
                 if not held:
                     free[effect.name] = free_all(own.get(effect.name, effect), per_session)
     for name, effect in own.items():
-        if name not in free and (again := refitted(effect)).scale:
-            free[name] = again
+        estimates = effect.estimates
+        # A parameter without an uncertainty is believed as it stands.
+        scale = {p.key: p.scale for p in effect.parameters if estimates[p.key].sigma > 0.0}
+        if name not in free and scale:
+            free[name] = FreeEffect(effect, scale)
     return tuple(free.values()), tuple(own[name] for name in own if name not in free)
 
 
@@ -110,22 +81,18 @@ def within_tolerances(free: Sequence[FreeEffect], shimmed: bool = True) -> tuple
     So a search holds them, and so does the fit of what it named: a flange that stands otherwise
     is a fault with a name of its own, and gaps that may go anywhere would take a part of any other.
 
-    Parameters
-    ----------
-    free : sequence of FreeEffect
-        With the priors of their laws.
-    shimmed : bool
-        Whether the gaps still are as shims left them; an axis that moved later opened them.
+    `free`: with the priors of their laws; `shimmed`: whether the gaps still are as shims left them;
+    an axis that moved later opened them.
     """
-    return tuple(_within_tolerance(each, shimmed) for each in free)
-
-
-def _within_tolerance(free: FreeEffect, shimmed: bool) -> FreeEffect:
-    if free.effect.law.id not in TOLERATED:
-        return free
-    if free.effect.law.id == GAPS:
-        return replace(free, scale=dict.fromkeys(free.scale, SHIM_UM)) if shimmed else free
-    return replace(free, scale={key: EVENLY_SPREAD * limit for key, limit in free.scale.items()})
+    found = []
+    for each in free:
+        scale = each.scale
+        if each.effect.law.id == GAPS:
+            scale = dict.fromkeys(scale, SHIM_UM) if shimmed else scale
+        elif each.effect.law.id in TOLERATED:
+            scale = {key: EVENLY_SPREAD * limit for key, limit in scale.items()}
+        found.append(replace(each, scale=scale))
+    return tuple(found)
 
 
 def unfitted(model: ErrorModel) -> ErrorModel:

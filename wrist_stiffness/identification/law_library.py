@@ -8,14 +8,12 @@ from itertools import groupby, product
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import gammaln
 
-from wrist_stiffness.identification.forms import Form, Shape, Span, evaluated, forms
+from wrist_stiffness.identification.forms import Form, Shape, evaluated, forms
 from wrist_stiffness.identification.proposal import twins
 from wrist_stiffness.identification.wrist_fit import WristFit
-from wrist_stiffness.inference.evidence import Evidence
+from wrist_stiffness.inference.evidence import Evidence, modes
 from wrist_stiffness.inference.point import OUTSIDE
-from wrist_stiffness.inference.possible import TAIL
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.batch import CHUNK
 from wrist_stiffness.model.evaluation import evaluate
@@ -93,9 +91,9 @@ class Library:
             sessions = [own[name] for own in found]
             known = [key for key in sessions[0] if all(key in own for own in sessions)]
             self._signals.append([{key: own[key] for key in known} for own in sessions])
-        numbers = fit.table.table.values.size
+        numbers = fit.table.observations.values.size
         self.white = fit.table.whiten(
-            np.eye(numbers).reshape(-1, fit.table.table.n_components, numbers)
+            np.eye(numbers).reshape(-1, fit.table.observations.n_components, numbers)
         )
         self._known: dict[str, Array | None] = {}
         self._points: list[list[list[tuple[Form, Shape, Array]]]] = []
@@ -175,7 +173,8 @@ class Library:
         if not moving:
             return law, price
         spans = [law.form.spans[n] for n in moving]
-        ranges = [_range(span) for span in spans]
+        ends = [np.array([span.grid[0], span.grid[-1]]) for span in spans]
+        ranges = [np.log(e) if s.positive else e for s, e in zip(spans, ends, strict=True)]
 
         def shape(x: Array) -> Shape:
             own = list(law.shape)
@@ -223,12 +222,6 @@ def spread(rows: Array, parts: Array) -> Array:
     return (rows[:, None, :, None] * parts).reshape(-1, *parts.shape[1:])
 
 
-def _range(span: Span) -> tuple[float, float]:
-    ends = np.array([span.grid[0], span.grid[-1]])
-    low, high = np.log(ends) if span.positive else ends
-    return float(low), float(high)
-
-
 class Beyond:
     """What laws gain beside a state, to first order, from their forms on the units alone."""
 
@@ -266,26 +259,8 @@ class Beyond:
                 information[:, :, i, :, j] = both
                 information[:, :, j, :, i] = both.swapaxes(1, 2)
         flat = information.reshape(n, r * k, r * k), slope.reshape(n, r * k)
-        found = [_modes(*flat, near) for near in (1.0, 1e-8)]
-        better = found[0][0] >= found[1][0]
-        gains = np.where(better, found[0][0], found[1][0])
-        return gains, np.where(better[:, None], found[0][1], found[1][1]).reshape(n, r, k)
-
-
-def _modes(information: Array, slope: Array, near: float) -> tuple[Array, Array]:
-    """Laplace's method for many effects at once: see `evidence`."""
-    count = slope.shape[1]
-    weight = np.full(len(slope), near)
-    for _ in range(5):
-        whole = information + weight[:, None, None] * np.eye(count)
-        z = np.linalg.solve(whole, slope[..., None])[..., 0]
-        square = np.sum(z**2, axis=1)
-        weight = (TAIL + count) / (TAIL + square)
-    fits = np.einsum("ni,ni->n", slope, z)
-    fits -= 0.5 * np.einsum("ni,nij,nj->n", z, information, z)
-    prior = gammaln(0.5 * (TAIL + count)) - gammaln(0.5 * TAIL) - 0.5 * count * np.log(TAIL / 2.0)
-    prior = prior - 0.5 * (TAIL + count) * np.log1p(square / TAIL)
-    return np.asarray(fits + prior - 0.5 * np.linalg.slogdet(whole)[1]), np.asarray(z)
+        gains, z, _ = modes(*flat)
+        return gains, z.reshape(n, r, k)
 
 
 def _signals_at(fit: WristFit, number: int) -> dict[str, dict[str, Array]]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -12,13 +13,14 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.free_effects import FreeEffect
 from wrist_stiffness.identification.shims import GAP, Shims
 from wrist_stiffness.inference.observations import Observations
-from wrist_stiffness.inference.settings import FEWEST_UNITS
+from wrist_stiffness.inference.outliers import FEWEST_UNITS
 from wrist_stiffness.inference.shared import Apart, own_covariance
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.sessions.columns import SessionModel
-from wrist_stiffness.sessions.observing import Observed, tabulate, usual_wander
+from wrist_stiffness.sessions.observing import tabulate, usual_wander
 from wrist_stiffness.sessions.refitted import REGISTRATIONS
 from wrist_stiffness.sessions.unit_session import UnitSession
 
@@ -45,10 +47,8 @@ blind to scales, and what rounding says differs from machine to machine."""
 def require_units(problem: FitProblem) -> None:
     """Refuse recordings that are too short to fit to.
 
-    Raises
-    ------
-    InputError
-        With the sessions, the number of units and the least one, or that of measured numbers.
+    Raises `InputError` with the sessions, the number of units and the least one, or that of
+    measured numbers.
     """
     units, table = problem.table.n_units, problem.table
     if units < FEWEST_UNITS:
@@ -62,40 +62,26 @@ def require_units(problem: FitProblem) -> None:
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number that is fitted, counted in steps from the mean of its prior.
+    """One number that is fitted, counted in steps from the mean of its prior."""
 
-    Parameters
-    ----------
-    free : int
-        Place of its effect among the free ones.
-    key : str
-        Name of the parameter.
-    session : int or None
-        Session whose own it is, None for the wrist's.
-    mean, step : float
-        Where it starts and its natural size, in the unit of its name.
-    weight : float
-        `step` over the standard deviation of the prior.
-    lower, upper : float
-        Bounds, in the unit of its name.
-    """
-
-    free: int
-    key: str
-    session: int | None
+    free: int  # place of its effect among the free ones
+    effect: Effect  # this one, as it starts
+    parameter: Parameter
+    session: int | None  # session whose own it is, None for the wrist's
+    # where it starts and its natural size, in the unit of its name
     mean: float
     step: float
-    weight: float
-    lower: float
-    upper: float
+    weight: float  # `step` over the standard deviation of the prior
+
+    @property
+    def key(self) -> str:
+        """Name of the parameter."""
+        return self.parameter.key
 
     def value(self, steps: float) -> float:
         """Return its value so many steps from the mean, within the bounds."""
-        return min(max(self.mean + steps * self.step, self.lower), self.upper)
-
-
-def _weight(free: FreeEffect, key: str) -> float:
-    return 1.0 if np.isfinite(free.scale[key]) else NO_PRIOR
+        own = self.parameter
+        return min(max(self.mean + steps * self.step, own.lower), own.upper)
 
 
 def _together(one: Effect, other: Effect) -> Effect:
@@ -109,21 +95,12 @@ def _together(one: Effect, other: Effect) -> Effect:
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """A model, sessions, and what may move.
+    """A model, sessions, and what may move."""
 
-    Parameters
-    ----------
-    model : ErrorModel
-        Table and the effects that stay as they are.
-    sessions : tuple of UnitSession
-        In the order of time.
-    free : tuple of FreeEffect
-        What may move; none of them is among the model's effects.  The second of one name is what
-        came on top of the first after the wrist was fitted: no shim follows it.
-    """
-
-    model: ErrorModel
-    sessions: tuple[UnitSession, ...]
+    model: ErrorModel  # table and the effects that stay as they are
+    sessions: tuple[UnitSession, ...]  # in the order of time
+    # what may move; none of them is among the model's effects.  The second of one name is what came
+    # on top of the first after the wrist was fitted: no shim follows it
     free: tuple[FreeEffect, ...]
 
     @cached_property
@@ -134,17 +111,16 @@ class FitProblem:
             for place, free in enumerate(self.free):
                 if free.per_session == (session is None) or self._mounted(free):
                     continue
-                bounds = {p.key: p for p in free.effect.parameters}
+                parameters = {p.key: p for p in free.effect.parameters}
                 found += [
                     Unknown(
                         place,
-                        key,
+                        free.effect,
+                        parameters[key],
                         session,
                         free.effect.estimates[key].value,
                         free.step[key],
-                        _weight(free, key),
-                        bounds[key].lower,
-                        bounds[key].upper,
+                        1.0 if np.isfinite(free.scale[key]) else NO_PRIOR,
                     )
                     for key in free.scale
                 ]
@@ -158,8 +134,8 @@ class FitProblem:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds in steps, (p,)."""
-        lower = [(u.lower - u.mean) / u.step for u in self.unknowns]
-        upper = [(u.upper - u.mean) / u.step for u in self.unknowns]
+        lower = [(u.parameter.lower - u.mean) / u.step for u in self.unknowns]
+        upper = [(u.parameter.upper - u.mean) / u.step for u in self.unknowns]
         return np.array(lower), np.array(upper)
 
     @property
@@ -170,12 +146,7 @@ class FitProblem:
     def effects(self, z: Array, session: int) -> tuple[Effect, ...]:
         """Return the free effects as a session has them, gaps as shims leave them.
 
-        Parameters
-        ----------
-        z : (p,) float
-            Steps from the prior means.
-        session : int
-            Number of the session.
+        `z` (p,): steps from the prior means; `session`: number of the session.
         """
         return self._with_values(self._values(z, session))
 
@@ -196,7 +167,7 @@ class FitProblem:
             keys[place] = place, (*own, (GAP, gap))
         found = {place: self._effect(*keys[place]) for place in built}
         for place, first in self._on_top.items():
-            found[first] = self._sum(*keys[first], *keys[place])
+            found[first] = self._effect(*keys[first], *keys[place])
         return tuple(found.values())
 
     def _moved(
@@ -209,7 +180,7 @@ class FitProblem:
         """Return the effects of these values with one unknown so many steps from its mean."""
         free = unknown.free
         own = values[free] | {unknown.key: unknown.value(steps)}
-        with_others = self._shims.move_with(self.free[free].effect)
+        with_others = self._shims.move_with(unknown.effect)
         if with_others or free in self._on_top or free in self._on_top.values():
             return self._with_values([*values[:free], own, *values[free + 1 :]])
         at = self._built.index(free)
@@ -223,24 +194,19 @@ class FitProblem:
         return {place: first for place, first in enumerate(firsts) if first != place}
 
     @cached_property
-    def _effect(self) -> Callable[[int, Values], Effect]:
-        """Free effects with values: trials that differ in one effect share all others."""
+    def _effect(self) -> Callable[..., Effect]:
+        """Free effects by place and values: trials that differ in one effect share all others.
+
+        With a further place and values it is the sum of both.
+        """
 
         @lru_cache(maxsize=MOST_KNOWN)
-        def effect(place: int, values: Values) -> Effect:
+        def effect(place: int, values: Values, *on_top: Any) -> Effect:
+            if on_top:
+                return _together(effect(place, values), effect(*on_top))
             return self.free[place].effect.with_values(dict(values))
 
         return effect
-
-    @cached_property
-    def _sum(self) -> Callable[[int, Values, int, Values], Effect]:
-        """Sums of two of these effects."""
-
-        @lru_cache(maxsize=MOST_KNOWN)
-        def together(first: int, own: Values, place: int, values: Values) -> Effect:
-            return _together(self._effect(first, own), self._effect(place, values))
-
-        return together
 
     @cached_property
     def _built(self) -> tuple[int, ...]:
@@ -258,12 +224,11 @@ class FitProblem:
 
     def residual(self, z: Array) -> Array:
         """Return log(T_measured T_predicted^-1) of all units, (u, 6) at O in F [m, rad]."""
-        return self.rows(
-            [
-                self._residuals(number, [self.effects(z, number)])[0]
-                for number in range(len(self.sessions))
-            ]
-        )
+        blocks = []
+        for number, (session, model) in enumerate(zip(self.sessions, self._models, strict=True)):
+            effects = (*self.model.effects, *self.effects(z, number))
+            blocks.append(session.residual(model.along([effects])[0]))
+        return self.rows(blocks)
 
     def columns(self, z: Array, places: Collection[int] | None = None) -> Array:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
@@ -273,47 +238,36 @@ class FitProblem:
         past: that is far quicker, and good enough for the slope.  Play stays: where a pin is free,
         nothing else has the slope that it has without.
 
-        Parameters
-        ----------
-        z : (p,) float
-            Steps from the prior means.
-        places : collection of int, optional
-            Which unknowns are asked for; all by default.
-
-        Returns
-        -------
-        (u, 6, p or number of places) array
-            In the order of `places`.
+        `z` (p,): steps from the prior means; `places`: which unknowns are asked for; all by
+        default.
+        Those are in the order of `places`.
         """
         asked = list(range(len(self.unknowns)) if places is None else places)
-        return self.rows([self._columns(number, z, asked) for number in range(len(self.sessions))])
+        return self._slopes(z, asked, lambda session, twists: session.residual(twists))
 
     def twists(self, z: Array) -> Array:
         """Return by how much a step of each unknown turns and shifts the platform, (u, 6, p)."""
-        blocks = []
-        for number in range(len(self.sessions)):
-            path, trials, moved, step = self._trials(number, z, list(range(len(z))))
-            block = np.zeros((*path.shape, len(z)))
-            for place, twist in zip(moved, trials, strict=True):
-                block[:, :, place] = np.nan_to_num((twist - path) / step[place])
-            blocks.append(block)
-        return self.rows(blocks)
+        return self._slopes(z, list(range(len(z))), lambda session, twists: twists)
 
-    def _columns(self, number: int, z: Array, asked: list[int]) -> Array:
-        """Return the columns of one session's units, (u, m, number asked)."""
-        path, twists, moved, step = self._trials(number, z, asked)
-        first, *others = self.sessions[number].residual(np.stack([path, *twists]))
-        block = np.zeros((*first.shape, len(z)))
-        for place, other in zip(moved, others, strict=True):
-            block[:, :, place] = np.nan_to_num((other - first) / step[place])
-        return block[:, :, asked]
+    def _slopes(
+        self, z: Array, asked: list[int], shown: Callable[[UnitSession, Array], Array]
+    ) -> Array:
+        """Return the change by a step of some unknowns of what twists (t, u, 6) are shown as."""
+        blocks = []
+        for number, session in enumerate(self.sessions):
+            path, twists, moved, step = self._trials(number, z, asked)
+            first, *others = shown(session, np.stack([path, *twists]))
+            block = np.zeros((*first.shape, len(z)))
+            for place, other in zip(moved, others, strict=True):
+                block[:, :, place] = np.nan_to_num((other - first) / step[place])
+            blocks.append(block[:, :, asked])
+        return self.rows(blocks)
 
     def _trials(
         self, number: int, z: Array, asked: list[int]
     ) -> tuple[Array, list[Array], list[int], Array]:
         """Return a session's predicted twists (u, 6), those with a step of some unknowns, both."""
         model = self._models[number]
-
         values = self._values(z, number)
         effects = self._with_values(values)
         whole = (*self.model.effects, *effects)
@@ -325,7 +279,7 @@ class FitProblem:
                 continue
             other = self._moved(effects, values, unknown, float(z[place] + step[place]))
             trial = (*self.model.effects, *other)
-            by_path.append(model.remembers((self.free[unknown.free].effect,)))
+            by_path.append(model.remembers((unknown.effect,)))
             trials.append(trial if by_path[-1] else model.of_the_moment(trial))
             moved.append(place)
         path, quick, *changed = model.predicted(
@@ -375,33 +329,19 @@ class FitProblem:
 
     def whiten(self, values: Array) -> Array:
         """Bring (u, 6) or (u, 6, k) to about unit scatter, (6u,) or (6u, k); NaN become zero."""
-        columns = values if values.ndim == 3 else values[:, :, None]
-        measured = self.table.measured[:, :, None]
-        filled = np.where(measured, np.nan_to_num(columns), 0.0)
-        white = self._apart(filled)
-        flat: Array = white.reshape(len(white) * white.shape[1], columns.shape[2])
-        return flat if values.ndim == 3 else flat[:, 0]
+        return self._apart.rows(values)
 
     @cached_property
     def table(self) -> Observations:
         """Conditions, known scatter and labels of the units, with what was measured as values."""
-        return self._tabulated.observations
-
-    @cached_property
-    def _tabulated(self) -> Observed:
         units = sum(map(len, self.sessions))
-        return tabulate(self.model, self.sessions, np.zeros((units, 6)))
+        return tabulate(self.model, self.sessions, np.zeros((units, 6))).observations
 
     def rows(self, blocks: list[Array]) -> Array:
         """Put the sessions' units together and keep those of the table."""
         return np.concatenate(
             [block[each.measured] for block, each in zip(blocks, self.sessions, strict=True)]
         )
-
-    def _residuals(self, number: int, additions: Sequence[Sequence[Effect]]) -> list[Array]:
-        session = self.sessions[number]
-        trials = [(*self.model.effects, *added) for added in additions]
-        return [session.residual(each) for each in self._models[number].along(trials)]
 
     @cached_property
     def _models(self) -> tuple[SessionModel, ...]:

@@ -14,7 +14,8 @@ from wrist_stiffness.inference.discrepancy import (
     scaled,
     straight,
 )
-from wrist_stiffness.inference.observations import Labels
+from wrist_stiffness.inference.noise import in_each_component
+from wrist_stiffness.inference.observations import Labels, Observations
 from wrist_stiffness.mechanism.components import Array
 
 Conditions = Mapping[str, Array]
@@ -127,6 +128,12 @@ def questions(conditions: Conditions) -> tuple[Question, ...]:
 
     beside = [name for name in conditions if name not in KNOWN and not name.startswith("T_")]
     return (*QUESTIONS, *map(of, beside))
+
+
+def smooth_columns(table: Observations) -> Array:
+    """Return what the usual questions ask, in each component of the units, (u, m, q)."""
+    asked = [each.features(table.covariates) for each in questions(table.covariates)]
+    return in_each_component(asked, table)
 
 
 def finer_questions(conditions: Conditions) -> tuple[Question, ...]:

@@ -25,15 +25,10 @@ UM = 1e6
 
 @dataclass(frozen=True, eq=False)
 class Shims:
-    """How the axes open the flanges at home.
+    """How the axes open the flanges at home."""
 
-    Parameters
-    ----------
-    opening : dict of str to tuple of (str, str, float)
-        By axis effect: its parameter, a joint, and how far that one's flanges open for a unit
-        of the parameter [m, m/rad].
-    """
-
+    # by axis effect: its parameter, a joint, and how far that one's flanges open for a unit of the
+    # parameter [m, m/rad]
     opening: Mapping[str, tuple[tuple[str, str, float], ...]]
 
     @classmethod
@@ -61,24 +56,17 @@ class Shims:
     def gaps(self, start: Sequence[Effect], found: Sequence[Effect]) -> dict[int, float]:
         """Return the gaps of found effects when they follow the axes from where these started.
 
-        Returns
-        -------
-        dict of int to float
-            `gap_um` by the place of the effect that has it.
+        Returns `gap_um` by the place of the effect that has it.
         """
         opened: dict[str, float] = {}
         for before, after in zip(start, found, strict=True):
             for key, joint, slope in self.opening.get(after.name, ()):
                 change = slope * (after.si[key] - before.si[key])
                 opened[joint] = opened.get(joint, 0.0) + change
-        return {
-            place: _closed(effect, opened[effect.component])
-            for place, effect in enumerate(found)
-            if effect.law.id == GAPS and effect.component in opened
-        }
-
-
-def _closed(effect: Effect, opened: float) -> float:
-    (parameter,) = effect.parameters
-    gap = effect.estimates[GAP].value - UM * opened
-    return min(max(gap, parameter.lower), parameter.upper)
+        gaps = {}
+        for place, effect in enumerate(found):
+            if effect.law.id == GAPS and effect.component in opened:
+                (own,) = effect.parameters
+                gap = effect.estimates[GAP].value - UM * opened[effect.component]
+                gaps[place] = min(max(gap, own.lower), own.upper)
+        return gaps

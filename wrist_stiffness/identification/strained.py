@@ -24,31 +24,17 @@ RARE = 0.01
 
 @dataclass(frozen=True)
 class Strain:
-    """How far all tolerances together are from the drawing.
+    """How far all tolerances together are from the drawing."""
 
-    Parameters
-    ----------
-    square : float
-        Chi-square of what the data know of them.
-    freedom : int
-        Combinations of tolerances that they know.
-    chance : float
-        Probability that a wrist within its tolerances is as far off, in all or in any one of them.
-    first : str
-        `law@place parameter` whose tolerance, given up, explains most.
-    value, times : float
-        What that parameter is then, in the unit of its name, and in its tolerances.
-    rest : float
-        Chi-square that is left then.
-    """
-
-    square: float
-    freedom: int
+    square: float  # chi-square of what the data know of them
+    freedom: int  # combinations of tolerances that they know
+    # probability that a wrist within its tolerances is as far off, in all or in any one of them
     chance: float
-    first: str
+    first: str  # `law@place parameter` whose tolerance, given up, explains most
+    # what that parameter is then, in the unit of its name, and in its tolerances
     value: float
     times: float
-    rest: float
+    rest: float  # chi-square that is left then
 
     @property
     def sentence(self) -> str:
@@ -68,18 +54,15 @@ class Strain:
 def strain(fit: WristFit) -> Strain | None:
     """Return how far the tolerances of a fit are from the drawing; None where it has none.
 
-    Parameters
-    ----------
-    fit : WristFit
-        With set-up and tolerances.
+    `fit`: with set-up and tolerances.
     """
     base, found = fit.base, fit.evidence
     problem, point = base.problem, found.point
-    names = [problem.free[each.free].effect for each in problem.unknowns]
+    effects = [each.effect for each in problem.unknowns]
     at = np.array(
         [
             place
-            for place, effect in enumerate(names)
+            for place, effect in enumerate(effects)
             if base.of_base[place]
             and effect.law.id in TOLERATED
             and np.isfinite(base.prior_std[place])
@@ -106,7 +89,7 @@ def strain(fit: WristFit) -> Strain | None:
         square,
         freedom,
         float(min(2.0 * min(chdtrc(freedom, square), alone), 1.0)),
-        f"{names[at[far]].name} {unknown.key}",
+        f"{unknown.effect.name} {unknown.key}",
         unknown.value(times / float(weight[far])),
         times,
         square - float(gains[far]),

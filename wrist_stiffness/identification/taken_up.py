@@ -19,24 +19,15 @@ from wrist_stiffness.sessions.unit_session import QUANTITIES
 
 @dataclass(frozen=True)
 class TakenUp:
-    """One part of the base.
+    """One part of the base."""
 
-    Parameters
-    ----------
-    name : str
-        Effect and place, and the session where it is set up anew in each.
-    moved : dict of str to float
-        Root mean square by which it moved the prediction of what was measured, by quantity, in the
-        unit of its report.
-    parameter : str
-        Of a tolerance: the parameter that went furthest; empty for what has no prior.
-    value, deviations : float
-        Of that parameter: in the unit of its name, and in standard deviations of its prior.
-    """
-
-    name: str
+    name: str  # effect and place, and the session where it is set up anew in each
+    # root mean square by which it moved the prediction of what was measured, by quantity, in the
+    # unit of its report
     moved: dict[str, float]
+    # of a tolerance: the parameter that went furthest; empty for what has no prior
     parameter: str = ""
+    # of that parameter: in the unit of its name, and in standard deviations of its prior
     value: float = 0.0
     deviations: float = 0.0
 
@@ -58,17 +49,12 @@ class TakenUp:
 def taken_up(base: BaseFit, sessions: Sequence[str]) -> tuple[TakenUp, ...]:
     """Tell what each part of a base took up: the set-up first, then tolerances, furthest first.
 
-    Parameters
-    ----------
-    base : BaseFit
-        Fitted.
-    sessions : sequence of str
-        Their names.
+    `base`: fitted; `sessions`: their names.
     """
     groups: dict[str, list[int]] = {}
     for place, unknown in enumerate(base.problem.unknowns):
         if base.of_base[place]:
-            name = base.problem.free[unknown.free].effect.name
+            name = unknown.effect.name
             where = "" if unknown.session is None else f" in {sessions[unknown.session]}"
             groups.setdefault(name + where, []).append(place)
     found = [_one(base, name, places) for name, places in groups.items()]

@@ -51,36 +51,20 @@ def silent(text: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class WristDiagnosis:
-    """Answer of a diagnosis on the wrist.
+    """Answer of a diagnosis on the wrist."""
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        What is missing, and how sure that is.
-    effects : tuple of Effect
-        Most probable member of each finding, fitted with its own law.
-    nominal, fitted : BaseFit
-        The model with its tolerances as fitted without any effect, and with those.
-    absorbed : tuple of TakenUp
-        What calibration took up: the set-up first, then tolerances, furthest from its prior first.
-    search : Search
-        With every set that was fitted, for what each rival would explain.
-    classes : tuple of Class
-        Of the most probable set.
-    proposals : Proposals, optional
-        Laws for what no effect of the catalogue explains; asked where the verdict is `unknown`.
-    strain : Strain, optional
-        How far all tolerances together are from the drawing; None beside a proposed law.
-    """
-
-    diagnosis: Diagnosis
-    effects: tuple[Effect, ...]
+    diagnosis: Diagnosis  # what is missing, and how sure that is
+    effects: tuple[Effect, ...]  # most probable member of each finding, fitted with its own law
+    # the model with its tolerances as fitted without any effect, and with those
     nominal: BaseFit
     fitted: BaseFit
+    # what calibration took up: the set-up first, then tolerances, furthest from its prior first
     absorbed: tuple[TakenUp, ...]
-    search: Search
-    classes: tuple[Class, ...]
+    search: Search  # with every set that was fitted, for what each rival would explain
+    classes: tuple[Class, ...]  # of the most probable set
+    # laws for what no effect of the catalogue explains; asked where the verdict is `unknown`
     proposals: Proposals | None = None
+    # how far all tolerances together are from the drawing; None beside a proposed law
     strain: Strain | None = None
 
     @property
@@ -92,18 +76,9 @@ class WristDiagnosis:
     def change_by(self, name: str) -> Array:
         """Return what the best set with a rival explains of each unit, (u, 6) [m, rad].
 
-        Raises
-        ------
-        InputError
-            If no set with it was fitted.
+        Raises `InputError` if no set with it was fitted.
         """
-        states = [each for each in self.search.states.values() if name in each.names]
-        if not states:
-            raise InputError(
-                f"{name}: was not fitted; slopes alone told that it explains too little"
-            )
-        best = max(states, key=lambda each: each.log)
-        change = self.nominal.residual - best.fit.base.residual
+        change = self.nominal.residual - self.search.best_with(name).fit.base.residual
         return without_mounting(self.nominal.problem.table, change)
 
 
@@ -153,9 +128,10 @@ def diagnose_sessions(
     search.run()
     reading = _settled(read(search, naming))
     tell("judging by what was held out")
-    judge = _Judged(model, units, search, reading)
-    kept = judge.kept(search, reading)
-    reading = kept if kept is reading else _settled(kept)
+    judge = _Judged(model, units, search, reading.state.fit.base)
+    if reading.named and refuted(judge.before, judge.after):
+        # What the held-out part speaks against is not handed over.
+        judge.after, reading = judge.before, _settled(reading.refute(search.base))
     proposals = None
     if search.in_time and (reading.verdict == "unknown" or reading.depends_on):
         proposals = propose(problem, reading.state.fit, naming, tell)
@@ -166,14 +142,14 @@ def diagnose_sessions(
         _finding(search, e, reading, None) for e in reading.classes if e not in reading.named
     ]
     table = state.fit.table
-    held = judge.stages
+    reported = table.observations.reported
     diagnosis = Diagnosis(
         reading.verdict,
         reading.probability,
         table.noise(state.evidence),
         table.above(state.evidence),
-        _errors(table.table, held[0]),
-        _errors(table.table, held[-1]),
+        {q.key: judge.before.rmse(q) for q in reported},
+        {q.key: judge.after.rmse(q) for q in reported},
         tuple(findings),
         tuple(suspects),
         reading.depends_on,
@@ -217,38 +193,30 @@ def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
 
 
 class _Judged:
-    """The stages of an answer, judged by what was not seen."""
+    """An answer, judged by what was not seen."""
 
     def __init__(
-        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, reading: Reading
+        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, near: BaseFit
     ) -> None:
         nominal: BaseFit = search.base.fit.base
         if len(whole) > len(nominal.problem.sessions):
             nominal, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
-        self._model, self._judge = model, Judge(nominal)
-        self._near: BaseFit = reading.state.fit.base
+        self._model, self._judge, self._near = model, Judge(nominal), near
         self.scope = self._judge.by
-        effects = list(reading.state.fit.base.beyond().values())
-        self.stages = [self._left(effects[:count]) for count in range(len(effects) + 1)]
+        self.before = self._left([])
+        self.after = self._left(list(near.beyond().values()))
 
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
         """Return what is left by the model with some effects."""
         judge = self._judge
         # A pin that rests where it does leads back there; from the nominal model it may not.
         near = self._near if effects else judge.whole
-        return judge.left(fit_base(self._model, judge.parts.seen, effects, near))
-
-    def kept(self, search: Search, reading: Reading) -> Reading:
-        """Return a reading without what the held-out part speaks against: it is not handed over."""
-        if not reading.named or not refuted(self.stages[0], self.stages[-1]):
-            return reading
-        self.stages = self.stages[:1]
-        return reading.refute(search.base)
+        return judge.left(fit_base(self._model, judge.seen, effects, near))
 
     def without(self, fitted: BaseFit, name: str) -> HeldOut:
         """Return what is left without one of the effects."""
         others = [each for own, each in fitted.beyond().items() if own != name]
-        return self._left(others) if others else self.stages[0]
+        return self._left(others) if others else self.before
 
 
 def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | None) -> Finding:
@@ -256,11 +224,11 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
     fit: WristFit = state.fit
     law, place = _law_and_place(found.name)
     effect = fit.base.beyond()[found.name]
-    quantities = fit.table.table.reported
+    quantities = fit.table.observations.reported
     buys = {}
     if judge is not None:
         before = judge.without(fit.base, found.name)
-        buys = {q.key: bought(before, judge.stages[-1], q) for q in quantities}
+        buys = {q.key: bought(before, judge.after, q) for q in quantities}
     normal = fit.base.problem.model.table.mechanism
     theta = np.concatenate([s.still.theta[s.measured] for s in fit.base.problem.sessions])
     points = turns_normal(fit.twist(found.name)[:, :, None], normal.normal(normal.forward(theta)))
@@ -292,18 +260,14 @@ def _law_and_place(name: str) -> tuple[str, str]:
 
 def _values(state: State, name: str, effect: Effect) -> dict[str, tuple[float, float]]:
     """Return the parameters of an effect and their standard uncertainties, in their units."""
-    places = state.fit.places[name]
-    known = {each.key: each for each in effect.parameters}
-    sigma = np.sqrt(np.diag(state.fit.covariance_by(state.evidence))[places])
-    keys = [state.fit.base.problem.unknowns[place].key for place in places]
+    fit: WristFit = state.fit
+    places = fit.places[name]
+    sigma = np.sqrt(np.diag(fit.covariance_by(state.evidence))[places])
+    parameters = [fit.problem.unknowns[place].parameter for place in places]
     return {
-        key: (effect.estimates[key].value, float(own * known[key].scale))
-        for key, own in zip(keys, sigma, strict=True)
+        each.key: (effect.estimates[each.key].value, float(own * each.scale))
+        for each, own in zip(parameters, sigma, strict=True)
     }
-
-
-def _errors(table: Observations, left: HeldOut) -> dict[str, float]:
-    return {quantity.key: left.rmse(quantity) for quantity in table.reported}
 
 
 def _not_excited(search: Search) -> tuple[NotExcited, ...]:

@@ -13,12 +13,19 @@ from scipy.optimize import lsq_linear
 from wrist_stiffness.identification.base_fit import BaseFit
 from wrist_stiffness.identification.candidates import possible
 from wrist_stiffness.identification.likelihood import WristTable
+from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.identification.result import FittedParameter, told_parameters
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.evidence import Evidence, known_noise
 from wrist_stiffness.inference.giving import WAYS, Give, given
+from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.point import Point
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.parameters import Parameter
+from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
+from wrist_stiffness.model.parameters import Estimate, Parameter
+from wrist_stiffness.sessions.observing import without_mounting
 
 MOST_ROUNDS = 10
 """Steps from where a fit ended to the maximum of the posterior."""
@@ -37,21 +44,11 @@ LEAST = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class WristFit:
-    """A set of effects fitted whole to the wrist.
+    """A set of effects fitted whole to the wrist."""
 
-    Parameters
-    ----------
-    base : BaseFit
-        Set-up, tolerances and effects.
-    table : WristTable
-        Of the same units.
-    gives : tuple of Give
-        In which ways laws of the set give.
-    """
-
-    base: BaseFit
-    table: WristTable
-    gives: tuple[Give, ...] = ()
+    base: BaseFit  # set-up, tolerances and effects
+    table: WristTable  # of the same units
+    gives: tuple[Give, ...] = ()  # in which ways laws of the set give
 
     @property
     def names(self) -> Collection[str]:
@@ -62,6 +59,32 @@ class WristFit:
         """Return what an effect of the set does to the predictions, (u, 6) to first order."""
         at = self.places[name]
         return np.asarray(-self.base.columns[:, :, at] @ self.base.z[at])
+
+    @property
+    def problem(self) -> FitProblem:
+        """What was fitted, without the lost units."""
+        return self.base.problem
+
+    @property
+    def z(self) -> Array:
+        """Steps of the unknowns from the means of their priors, (p,)."""
+        return self.base.z
+
+    @property
+    def observations(self) -> Observations:
+        """The units with what is left of them [m, rad]."""
+        table = self.problem.table
+        return table.with_values(without_mounting(table, self.base.residual))
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the steps settled."""
+        return self.base.arrived
+
+    @property
+    def lost(self) -> int:
+        """How many units were left out as lost beams."""
+        return self.table.lost
 
     @cached_property
     def ways(self) -> dict[Give, Array]:
@@ -86,8 +109,8 @@ class WristFit:
     @cached_property
     def places(self) -> dict[str, NDArray[np.intp]]:
         """Places of the unknowns of each effect."""
-        problem, of_base = self.base.problem, self.base.of_base
-        names = [problem.free[unknown.free].effect.name for unknown in problem.unknowns]
+        names = [each.effect.name for each in self.problem.unknowns]
+        of_base = self.base.of_base
         return {
             own: np.flatnonzero([n == own and not b for n, b in zip(names, of_base, strict=True)])
             for own in self.names
@@ -96,16 +119,9 @@ class WristFit:
     @cached_property
     def sized(self) -> dict[int, Parameter]:
         """Parameters by the place of their unknown, where they have a typical magnitude."""
-        problem, found = self.base.problem, {}
-        for places in self.places.values():
-            for place in places.tolist():
-                unknown = problem.unknowns[place]
-                own = next(
-                    p for p in problem.free[unknown.free].effect.parameters if p.key == unknown.key
-                )
-                if np.isfinite(own.scale):
-                    found[place] = own
-        return found
+        every = [place for places in self.places.values() for place in places.tolist()]
+        found = {place: self.problem.unknowns[place].parameter for place in every}
+        return {place: own for place, own in found.items() if np.isfinite(own.scale)}
 
     @cached_property
     def ratio(self) -> Array:
@@ -131,17 +147,16 @@ class WristFit:
     @cached_property
     def whole(self) -> Point:
         """Where the fit ended, whitened; effects in typical magnitudes from their law's mean."""
-        base, table = self.base, self.table
+        base, table, unknowns = self.base, self.table, self.problem.unknowns
         z = base.z.copy()
         inexact = [np.zeros((len(table.whiten(base.residual)), 0))]
         inexact += [self.ways[each][:, None] for each in self.gives]
         varied = {}
         for name, places in self.places.items():
-            effect = base.problem.free[base.problem.unknowns[places[0]].free].effect
             varied[name] = table.varied(self.change(name))
-            inexact.append(effect.law.inexactness * varied[name])
+            inexact.append(unknowns[places[0]].effect.law.inexactness * varied[name])
         for place, own in self.sized.items():
-            unknown = base.problem.unknowns[place]
+            unknown = unknowns[place]
             z[place] = (unknown.mean + base.z[place] * unknown.step - own.mean) / own.scale
         weight = base.problem.weights.copy()
         effects, sizing, can = {}, {}, {}
@@ -150,7 +165,7 @@ class WristFit:
             if not known:
                 continue
             weight[known] = 1.0
-            effect = base.problem.free[base.problem.unknowns[known[0]].free].effect
+            effect = unknowns[known[0]].effect
             keys = effect.law.sized_by(effect.component)
             effects[name] = np.array(known, dtype=np.intp)
             can[name] = possible(effect.law, tuple(self.sized[n] for n in known))
@@ -199,13 +214,66 @@ class WristFit:
         """Covariance of the steps of all unknowns where a fit has settled, (p, p)."""
         return self.covariance_by(self.evidence) * np.outer(self.ratio, self.ratio)
 
+    @property
+    def rough(self) -> bool:
+        """Whether more than noise is left."""
+        return self.evidence.unexplained > 0.0
+
+    @cached_property
+    def noise(self) -> dict[str, float]:
+        """Root mean square of the noise and the instrument's drift, by the key of the quantity."""
+        return self.table.noise_and_drift(self.evidence)
+
+    @cached_property
+    def discrepancy(self) -> dict[str, float]:
+        """Root mean square that the model leaves above that, likewise."""
+        return self.table.above(self.evidence)
+
+    @cached_property
+    def parameters(self) -> tuple[FittedParameter, ...]:
+        """All that was fitted, with uncertainties, where a fit has settled."""
+        prior = self.ratio / np.sqrt(self.evidence.precision[: len(self.z)])
+        return told_parameters(self.problem, self.z, self.covariance, prior)
+
+    def effects(self, session: int = -1) -> tuple[Effect, ...]:
+        """Return the free effects with estimates and uncertainties, as a session has them."""
+        problem = self.problem
+        session %= len(problem.sessions)
+        sigma = np.sqrt(np.diag(self.covariance))
+        estimates: list[dict[str, Estimate]] = [
+            dict(each.effect.estimates) for each in problem.free
+        ]
+        values = problem.effects(self.z, session)
+        for unknown, own in zip(problem.unknowns, sigma, strict=True):
+            if unknown.session in (None, session):
+                value = values[unknown.free].estimates[unknown.key].value
+                estimates[unknown.free][unknown.key] = Estimate(value, float(own) * unknown.step)
+        return tuple(
+            replace(each.effect, estimates=own)
+            for each, own in zip(problem.free, estimates, strict=True)
+        )
+
+    @property
+    def joint(self) -> JointUncertainty:
+        """What the uncertainties of all parameters make of a prediction together."""
+        rows, measured = self.base.columns, self.problem.table.measured
+        if any(each.gauges is not None for each in self.problem.sessions):
+            rows = self.problem.twists(self.z)
+            measured = np.ones(rows.shape[:2], dtype=bool)
+        variance = np.einsum("uij,jk,uik->ui", rows, self.covariance, rows)
+        mean = (variance * measured).sum(axis=0) / np.maximum(measured.sum(axis=0), 1)
+        names = tuple(free.effect.name for free in self.problem.free)
+        return JointUncertainty(names, np.sqrt(mean))
+
+    def model(self, session: int = -1) -> ErrorModel:
+        """Return the model with the fitted effects, as a session has them."""
+        model = self.problem.model
+        return model.with_effects(*model.effects, *self.effects(session))
+
     def covariance_by(self, found: Evidence) -> Array:
         """Covariance of all unknowns of `point`, by its evidence; what stands at a bound may move.
 
-        Parameters
-        ----------
-        found : Evidence
-            Of this fit.
+        `found`: of this fit.
         """
         return replace(found, point=self.whole).covariance_of_fit
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice, product
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from wrist_stiffness.identification.base_fit import (
     free_base,
     has_walls,
 )
-from wrist_stiffness.identification.best_multiple import best_multiple
 from wrist_stiffness.identification.candidates import (
     Point as WristPoint,
 )
@@ -25,7 +25,7 @@ from wrist_stiffness.identification.candidates import (
     searched,
     wrist_candidates,
 )
-from wrist_stiffness.identification.likelihood import WristTable, likelihood_of
+from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.amplitudes import evidence
@@ -41,18 +41,17 @@ LEAVES_MUCH, HELPS = 1.5, 0.8
 which its fit is tried again: from the drawing, for tolerances that gave way to a large effect may
 not find back, and with walls little by little."""
 
+FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
+"""Multiples of the typed values that are tried."""
+
+MOST_MULTIPLES = 512
+
 
 class WristProblem:
     """A wrist and its sessions as the search asks them.
 
-    Parameters
-    ----------
-    model : ErrorModel
-        What is known of the wrist.
-    sessions : tuple of UnitSession
-        In the order of time.
-    base : (tuple of FreeEffect, tuple of Effect), optional
-        What of the model is free and what stays; by default as `free_base` says.
+    `model`: what is known of the wrist; `sessions`: in the order of time; `base`: what of the model
+    is free and what stays; by default as `free_base` says.
     """
 
     def __init__(
@@ -60,9 +59,9 @@ class WristProblem:
     ) -> None:
         self._model, self._base = model, base or free_base(model)
         free, held = self._base
-        self._first, self.lost = fit_cleaned(FitProblem(model.with_effects(*held), sessions, free))
-        self._sessions = self._first.problem.sessions
-        self.table: WristTable = likelihood_of(self._first)
+        first, lost = fit_cleaned(FitProblem(model.with_effects(*held), sessions, free))
+        self._sessions, self.table = first.problem.sessions, likelihood_of(first, lost)
+        self._first = WristFit(first, self.table)
         self._extended: tuple[WristFit, Effect, WristFit] | None = None
         self._near: dict[WristCandidate, WristFit] = {}
         self._asked: tuple[BaseFit, dict[str, WristCandidate]] | None = None
@@ -80,7 +79,7 @@ class WristProblem:
 
     def begin(self) -> WristFit:
         """Return the nominal model with its tolerances."""
-        return WristFit(self._first, self.table)
+        return self._first
 
     def trials(self, fit: WristFit) -> Sequence[Trial]:
         """Return the catalogue about a fit."""
@@ -125,13 +124,10 @@ class WristProblem:
 
         Set-up and tolerances follow it; nearly as far as a whole fit, and far quicker.
 
-        Raises
-        ------
-        WristError
-            If its law finds no equilibrium.
+        Raises `WristError` if its law finds no equilibrium.
         """
         extras = [*fit.base.beyond().values(), effect]
-        return WristFit(self._fitted(extras, fit.base, quickly=True), self.table)
+        return self._fitted(extras, fit.base, quickly=True)
 
     def added(self, fit: WristFit, ranked: Ranked) -> WristFit | None:
         """Return the best fit with one effect more.
@@ -145,10 +141,7 @@ class WristProblem:
     def extended(self, fit: WristFit, effect: Effect) -> WristFit:
         """Return the best fit with an effect that somebody named; the last one is kept.
 
-        Raises
-        ------
-        InputError
-            If its law finds no equilibrium anywhere near these data.
+        Raises `InputError` if its law finds no equilibrium anywhere near these data.
         """
         last = self._extended
         if last is None or last[0].base is not fit.base or last[1] != effect:
@@ -159,10 +152,8 @@ class WristProblem:
     def _extend(self, fit: WristFit, effect: Effect) -> WristFit:
         point = self.about(fit)
         if any(not np.isfinite(parameter.scale) for parameter in effect.parameters):
-            start = best_multiple(fit.base, point, effect)
-            return WristFit(
-                self._fitted([*fit.base.beyond().values(), start], fit.base), self.table
-            )
+            start = _best_multiple(fit.base, point, effect)
+            return self._fitted([*fit.base.beyond().values(), start], fit.base)
         (candidate,) = wrist_candidates(point, [(effect.law, effect.component)])
         (best,) = ranked(evidence(fit.point, self.background), [self._trial(candidate)])
         found = self._added(fit, best, candidate)
@@ -176,28 +167,23 @@ class WristProblem:
             start = (self._nearly(fit, candidate, begun) or fit).base
             extras = list({begun.name: begun, **start.beyond()}.values())
             found = self._fitted(extras, start)
-            if found.variance > LEAVES_MUCH and found.cost < HELPS * fit.base.cost:
-                found = min(found, self._fitted(extras, None), key=_cost)
+            if found.base.variance > LEAVES_MUCH and found.base.cost < HELPS * fit.base.cost:
+                tried = [found, self._fitted(extras, None)]
                 if has_walls(begun):
-                    found = min(found, self._gradual(extras, fit.base), key=_cost)
+                    tried.append(self._fitted(extras, fit.base, gradually=True))
+                found = min(tried, key=lambda each: each.base.cost)
         except WristError:
             return None
-        return WristFit(found, self.table)
+        return found
 
     def without(self, fit: WristFit, name: str) -> WristFit:
         """Return the fit with one effect less, begun where this one ended."""
         others = [each for own, each in fit.base.beyond().items() if own != name]
-        return WristFit(self._fitted(others, fit.base), self.table)
+        return self._fitted(others, fit.base)
 
-    def _fitted(
-        self, extras: Sequence[Effect], start: BaseFit | None, quickly: bool = False
-    ) -> BaseFit:
-        own = self._model, self._sessions, extras, start
-        return fit_base(*own, base=self._base, quickly=quickly)
-
-    def _gradual(self, extras: Sequence[Effect], start: BaseFit) -> BaseFit:
-        own = self._model, self._sessions, extras, start, True
-        return fit_base(*own, walls="rounded first", base=self._base)
+    def _fitted(self, extras: Sequence[Effect], start: BaseFit | None, **how: bool) -> WristFit:
+        own = fit_base(self._model, self._sessions, extras, start, base=self._base, **how)
+        return WristFit(own, self.table)
 
     def _catalogue(self, fit: WristFit) -> dict[str, WristCandidate]:
         if self._asked is None or self._asked[0] is not fit.base:
@@ -212,25 +198,45 @@ class WristProblem:
 
         Play would be solved again for each of them.
         """
-        sessions = self._sessions
-        used = tuple(each.measured for each in sessions)
         models = []
-        for number in range(len(sessions)):
+        for number in range(len(self._sessions)):
             own = fit.base.model(number)
             beside = tuple(e for e in own.effects if not (e.name in fit.names and has_walls(e)))
             models.append(replace(own, effects=beside))
-        return WristPoint(tuple(models), used)
-
-
-def _cost(fitted: BaseFit) -> float:
-    return fitted.cost
+        return WristPoint(tuple(models))
 
 
 def _begun(candidate: WristCandidate, ranked: Ranked) -> Effect:
     """Return an effect with the values with which a fit begins."""
-    factors = [each.factor.key for each in candidate.recipe.columns(ranked.shape)]
-    values = (ranked.z * candidate.usual).tolist()
-    own = candidate.effect(dict(zip(factors, values, strict=True)), ranked.shape)
+    own = candidate.effect(ranked.z, ranked.shape)
     if has_walls(own):
         own = own.with_values({p.key: p.mean or p.scale for p in own.parameters})
     return own
+
+
+def _best_multiple(fitted: BaseFit, point: WristPoint, effect: Effect) -> Effect:
+    """Return an effect at the multiple of its values that explains most beside a base that follows.
+
+    `fitted`: what everything else explains, which to first order follows; `point`: the same, for
+    trials; `effect`: with the values that somebody typed.
+    """
+    # Weights where there is no prior are tiny: QR keeps them apart from rounding.
+    root, weights = np.sqrt(max(1.0, fitted.variance)), fitted.problem.weights
+    whiten = fitted.problem.whiten
+    basis = np.linalg.qr(np.vstack([whiten(fitted.columns) / root, np.diag(weights)]))[0]
+
+    def beyond(white: Array, offset: Array) -> Array:
+        rows = np.concatenate([white / root, offset])
+        return np.asarray(rows - basis @ (basis.T @ rows))
+
+    typed = {key: estimate.value or 1.0 for key, estimate in effect.estimates.items()}
+    factors = FACTORS if len(FACTORS) ** len(typed) <= MOST_MULTIPLES else (-1.0, 1.0)
+    tried = [
+        {key: value * f for (key, value), f in zip(typed.items(), each, strict=True)}
+        for each in islice(product(factors, repeat=len(typed)), MOST_MULTIPLES)
+    ]
+    changes = point.changes([(effect.law, effect.component, each) for each in tried])
+    white = whiten(np.moveaxis(changes, 0, -1))
+    explained = beyond(white, np.zeros((len(weights), len(tried))))
+    left = beyond(whiten(fitted.residual), weights * fitted.z)[:, None] - explained
+    return effect.with_values(tried[int(np.argmin(np.sum(left**2, axis=0)))])

@@ -4,8 +4,7 @@ Knows neither ROS nor this mechanism; `docs/inference.md` explains it.
 """
 
 from wrist_stiffness.inference.answer import Diagnosis, Finding
-from wrist_stiffness.inference.candidates import Candidate, Parameter, ShapeParameter
-from wrist_stiffness.inference.nuisance import Nuisance
+from wrist_stiffness.inference.candidates import Candidate, Nuisance, Parameter, ShapeParameter
 from wrist_stiffness.inference.observations import Observations, Quantity
 from wrist_stiffness.inference.predictor import Predictor, load_predictor
 from wrist_stiffness.inference.table_diagnosis import TableDiagnosis, diagnose

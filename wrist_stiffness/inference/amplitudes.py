@@ -39,19 +39,14 @@ def evidence(point: Point, background: Background, near: Evidence | None = None)
 
     Groups of the discrepancy that do not pay are not there.
 
-    Parameters
-    ----------
-    point : Point
-        Where its fit ended.
-    background : Background
-        Of the table; of a part no further groups are asked.
-    near : Evidence, optional
-        Of a set like it, beside the same background: where the search for the amplitudes begins.
+    `point`: where its fit ended; `background`: of the table; of a part no further groups are asked;
+    `near`: of a set like it, beside the same background: where the search for the amplitudes
+    begins.
     """
     at = beside_known(point, background) if near is None else settled(replace(near, point=point))
     while background.whole is None:
         asked = {n: size for n, (gain, size) in further(at, background).items() if gain > 0.0}
-        tried = _pruned(settled(_beside(at, {**_sizes(at), **asked}))) if asked else at
+        tried = _pruned(settled(beside(at, {**sizes_of(at), **asked}))) if asked else at
         if tried.unbounded < at.unbounded + ENOUGH:
             break
         at = tried
@@ -84,17 +79,9 @@ def settled(at: Evidence) -> Evidence:
 def further(at: Evidence, background: Background) -> dict[int, tuple[float, float]]:
     """Return what groups that are not there would add, all else held.
 
-    Parameters
-    ----------
-    at : Evidence
-        Of a set beside a part of the background.
-    background : Background
-        The whole.
-
-    Returns
-    -------
-    dict of int to (float, float)
-        By the place of each absent group: gain of log evidence at its best amplitude, and that.
+    `at`: of a set beside a part of the background; `background`: the whole.
+    Returns by the place of each absent group the gain of log evidence at its best amplitude, and
+    that.
     """
     absent = background.part(set(range(len(background.groups))) - set(at.background.numbers))
     if not absent.groups:
@@ -121,13 +108,13 @@ def _group_gain(information: Array, slope: Array, group: Group) -> tuple[float, 
     return float(found[best]), float(AMPLITUDES[best])
 
 
-def _sizes(at: Evidence) -> dict[int, float]:
+def sizes_of(at: Evidence) -> dict[int, float]:
     """Return the amplitudes of the groups that are there by their places in the whole."""
     return dict(zip(at.background.numbers, at.amplitude.tolist(), strict=True))
 
 
-def _beside(at: Evidence, sizes: Mapping[int, float]) -> Evidence:
-    """Return a set beside other groups of the whole, at these amplitudes."""
+def beside(at: Evidence, sizes: Mapping[int, float]) -> Evidence:
+    """Return a set beside other groups of the whole, at these amplitudes by their places there."""
     ground = (at.background.whole or at.background).part(sizes)
     amplitude = np.array([sizes[number] for number in ground.numbers])
     return replace(at, background=ground, amplitude=amplitude)
@@ -135,11 +122,11 @@ def _beside(at: Evidence, sizes: Mapping[int, float]) -> Evidence:
 
 def _pruned(at: Evidence) -> Evidence:
     """Return a set without the groups of the discrepancy that do not pay."""
-    sizes = _sizes(at)
+    sizes = sizes_of(at)
     for number, group in zip(at.background.numbers, at.background.groups, strict=True):
         if group.expected:
             continue
-        absent = _beside(at, {n: size for n, size in sizes.items() if n != number})
+        absent = beside(at, {n: size for n, size in sizes.items() if n != number})
         if absent.unbounded > at.unbounded:
             at = absent
             del sizes[number]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrist_stiffness.inference.amplitudes import further, settled
+from wrist_stiffness.inference.amplitudes import beside, further, settled, sizes_of
 from wrist_stiffness.inference.answer import MEMBER
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT
 from wrist_stiffness.inference.evidence import OFF, Array, Evidence
@@ -29,22 +29,13 @@ Chosen = frozenset[int]
 
 @dataclass(frozen=True)
 class Dependence:
-    """One condition on which the error depends.
+    """One condition on which the error depends."""
 
-    Parameters
-    ----------
-    members : dict of str to float
-        Questions that these data cannot tell apart, with the probability of each to be the one; the
-        most probable first.
-    probability : float
-        That the error depends on one of them.
-    groups : tuple of int
-        Places of the groups of the first one in the background.
-    """
-
+    # questions that these data cannot tell apart, with the probability of each to be the one; the
+    # most probable first
     members: Mapping[str, float]
-    probability: float
-    groups: tuple[int, ...]
+    probability: float  # that the error depends on one of them
+    groups: tuple[int, ...]  # places of the groups of the first one in the background
 
     @property
     def name(self) -> str:
@@ -54,44 +45,25 @@ class Dependence:
 
 @dataclass(frozen=True, eq=False)
 class Dependences:
-    """Answer to the question on what an error depends.
+    """Answer to the question on what an error depends."""
 
-    Parameters
-    ----------
-    found : tuple of Dependence
-        Of the most probable set, the surest first.
-    nothing : float
-        Probability that the error depends on nothing.
-    chances : dict of str to float
-        Probability of each question that was asked.
-    state : Evidence
-        Of the most probable set; its rows sum up those of the table.
-    chosen : tuple of int
-        Places of its groups in the background that was given.
-    """
-
-    found: tuple[Dependence, ...]
-    nothing: float
-    chances: Mapping[str, float]
-    state: Evidence
-    chosen: tuple[int, ...]
+    found: tuple[Dependence, ...]  # of the most probable set, the surest first
+    nothing: float  # probability that the error depends on nothing
+    chances: Mapping[str, float]  # probability of each question that was asked
+    state: Evidence  # of the most probable set; its rows sum up those of the table
+    chosen: tuple[int, ...]  # places of its groups in the background that was given
 
 
 def dependences(point: Point, background: Background) -> Dependences:
     """Find the groups of the discrepancy on which depends what a fit leaves.
 
-    Parameters
-    ----------
-    point : Point
-        Where the fit ended.
-    background : Background
-        All groups that are asked, and the drift.
+    `point`: where the fit ended; `background`: all groups that are asked, and the drift.
     """
     sets = _Sets(*_summed_up(point, background))
-    sets.climbed(sets.always)
-    best = sets.best
-    for name in sets.names(best):
-        sets.without(best, name)
+    sets.climbed(sets.state(dict.fromkeys(sets.of(SLOW_DRIFT), 1.0)))
+    first = sets.best
+    for name in sets.names(first):
+        sets.without(first, name)
     best = sets.best
     weights = sets.weights()
     asked = dict.fromkeys(each.name for each in background.groups if not each.expected)
@@ -103,7 +75,7 @@ def dependences(point: Point, background: Background) -> Dependences:
         tuple(sorted(found, key=lambda each: -each.probability)),
         sum(weight for chosen, weight in weights.items() if not sets.names(chosen)),
         chances,
-        sets.state(best),
+        sets.known(best),
         tuple(sorted(best)),
     )
 
@@ -144,30 +116,27 @@ def _summed_up(point: Point, background: Background) -> tuple[Point, Background]
         numbers=point.count,
         _beside={},
     )
-    return summed, replace(background, groups=groups)
+    return summed, replace(background, groups=groups, _parts={})
 
 
 class _Sets:
     """Sets of groups and their evidence."""
 
     def __init__(self, point: Point, background: Background) -> None:
-        self._point, self._all = point, background
-        self._known: dict[Chosen, tuple[float, Array, float]] = {}
+        self._bare = Evidence(point, background, np.zeros(0), 1.0)
+        self._groups = background.groups
+        # Evidences as they were found, without what was computed of them since.
+        self._known: dict[Chosen, tuple[float, Evidence]] = {}
         self._logs: dict[Chosen, float] = {}
-        self.always: Chosen = self.of(SLOW_DRIFT)
-        self._optional: Chosen = frozenset(np.flatnonzero(background.optional).tolist())
-
-    def name(self, number: int) -> str:
-        """Return the question of a group."""
-        return self._all.groups[number].name
 
     def names(self, chosen: Chosen) -> frozenset[str]:
         """Return the questions of a set."""
-        return frozenset(self.name(number) for number in chosen & self._optional)
+        groups = [self._groups[number] for number in chosen]
+        return frozenset(each.name for each in groups if not each.expected)
 
     def of(self, name: str) -> Chosen:
         """Return the groups of a question."""
-        return frozenset(n for n, each in enumerate(self._all.groups) if each.name == name)
+        return frozenset(n for n, each in enumerate(self._groups) if each.name == name)
 
     @property
     def best(self) -> Chosen:
@@ -176,62 +145,57 @@ class _Sets:
 
     def weights(self) -> dict[Chosen, float]:
         """Return the probability of each set, of those that were not tried whole to first order."""
-        logs = self._logs | {n: log for n, (log, _, _) in self._known.items() if log > -np.inf}
+        logs = self._logs | {n: log for n, (log, _) in self._known.items() if log > -np.inf}
         values = np.array(list(logs.values()))
         weights = np.exp(values - values.max())
         return dict(zip(logs, (weights / weights.sum()).tolist(), strict=True))
 
-    def state(
-        self, chosen: Chosen, start: Mapping[int, float] | None = None, excess: float = 1.0
-    ) -> Evidence:
+    def known(self, chosen: Chosen) -> Evidence:
+        """Return the evidence of a set that was visited."""
+        return replace(self._known[chosen][1])
+
+    def state(self, sizes: Mapping[int, float], excess: float = 1.0) -> Evidence:
         """Return the evidence of a set, the search for its amplitudes begun at those given."""
+        chosen = frozenset(sizes)
         if chosen in self._known:
-            return self._evidence(chosen, *self._known[chosen][1:])
-        begun = np.array([(start or {}).get(number, 1.0) for number in sorted(chosen)])
-        found = settled(self._evidence(chosen, begun, excess))
+            return self.known(chosen)
+        found = settled(beside(replace(self._bare, excess=excess), sizes))
         # With a group that is off it is the smaller set once more.
         log = found.log if (found.amplitude > OFF).all() else -np.inf
-        self._known[chosen] = log, found.amplitude, found.excess
+        self._known[chosen] = log, replace(found)
         return found
 
-    def _evidence(self, chosen: Chosen, amplitude: Array, excess: float) -> Evidence:
-        return Evidence(self._point, self._all.part(chosen), amplitude, excess)
-
-    def climbed(self, chosen: Chosen, barred: Chosen = frozenset()) -> None:
+    def climbed(self, at: Evidence, barred: Chosen = frozenset()) -> None:
         """Add to a set what helps most for as long as that pays."""
-        at = self.state(chosen)
         while True:
-            log, more, amplitude = self._promising(at, chosen, barred)
+            log, more, amplitude = self._promising(at, barred)
             if log < at.log - HELD:
                 break
-            there = self._added(at, chosen, more, amplitude)
-            reached = self.state(there)
+            reached = self._added(at, more, amplitude)
             if reached.log <= at.log:
                 break
-            chosen, at = there, reached
+            at = reached
 
-    def without(self, best: Chosen, name: str) -> None:
+    def without(self, chosen: Chosen, name: str) -> None:
         """Visit the best sets without a question, others in its place included."""
-        at, rest, barred = self.state(best), best - self.of(name), self.of(name)
-        kept = [place for place, number in enumerate(sorted(best)) if number in rest]
-        held = self._evidence(rest, at.amplitude[kept], at.excess)
-        log, more, amplitude = self._promising(held, rest, barred)
-        self.state(rest, dict(zip(sorted(rest), held.amplitude, strict=True)), at.excess)
+        at, barred = self.known(chosen), self.of(name)
+        rest = {number: size for number, size in sizes_of(at).items() if number not in barred}
+        held = beside(at, rest)
+        log, more, amplitude = self._promising(held, barred)
+        self.state(rest, at.excess)
         if log > at.log - HOPELESS:
-            self.climbed(self._added(held, rest, more, amplitude), barred)
+            self.climbed(self._added(held, more, amplitude), barred)
 
-    def _added(self, at: Evidence, chosen: Chosen, more: int, amplitude: float) -> Chosen:
+    def _added(self, at: Evidence, more: int, amplitude: float) -> Evidence:
         """Return what is there of a set with one group more."""
-        known = dict(zip(sorted(chosen), at.amplitude.tolist(), strict=True))
-        both = chosen | {more}
-        reached = self.state(both, {**known, more: amplitude}, at.excess)
-        on = zip(sorted(both), reached.amplitude, strict=True)
-        return frozenset(number for number, size in on if size > OFF)
+        reached = self.state({**sizes_of(at), more: amplitude}, at.excess)
+        on = [number for number, size in sizes_of(reached).items() if size > OFF]
+        return self.state(dict.fromkeys(on, 1.0))
 
-    def _promising(self, at: Evidence, chosen: Chosen, barred: Chosen) -> tuple[float, int, float]:
+    def _promising(self, at: Evidence, barred: Chosen) -> tuple[float, int, float]:
         """Return which group adds most, all else held: log evidence, group and amplitude."""
-        found = [(-np.inf, -1, 0.0)]
-        for number, (gain, amplitude) in further(at, self._all).items():
+        found, chosen = [(-np.inf, -1, 0.0)], frozenset(at.background.numbers)
+        for number, (gain, amplitude) in further(at, self._bare.background).items():
             if number not in barred:
                 self._logs[chosen | {number}] = at.log + gain
                 found.append((at.log + gain, number, amplitude))

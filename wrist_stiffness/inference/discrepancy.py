@@ -7,15 +7,16 @@ kernel over the units, and its amplitude is 0 unless the evidence wants it other
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from wrist_stiffness.inference.evidence import Array
-from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.observations import Array
 from wrist_stiffness.inference.point import Background, Group
+from wrist_stiffness.inference.projection import low_rank
+from wrist_stiffness.inference.shared import Whitened
+from wrist_stiffness.inference.smooth import Smooth
 
 DRIFT_S = (20.0, 200.0)
 """Correlation times of an instrument's slow drift, half of its variance each [s] (assumed)."""
@@ -31,30 +32,16 @@ WIDER = 4
 
 SLOW_DRIFT, PASSING_DRIFT = "slow drift of the instrument", "the time"
 
-LEAST = 1e-3
-"""Share of a kernel's trace that its columns may leave out."""
-
 
 @dataclass(frozen=True)
 class Question:
-    """On what an error may depend.
+    """On what an error may depend."""
 
-    Parameters
-    ----------
-    name : str
-        As a person reads it after "depends on".
-    kernel : callable
-        Conditions by name -> (u, u) float, or None where nothing of it was recorded.
-    rank : int
-        Most columns of it.
-    conditions : tuple of str
-        Names of those that the kernel looks at.
-    """
-
-    name: str
+    name: str  # as a person reads it after "depends on"
+    # conditions by name -> (u, u) float, or None where nothing of it was recorded
     kernel: Callable[[Mapping[str, Array]], Array | None]
-    rank: int
-    conditions: tuple[str, ...] = ()
+    rank: int  # most columns of it
+    conditions: tuple[str, ...] = ()  # names of those that the kernel looks at
 
     def features(self, conditions: Mapping[str, Array]) -> Array | None:
         """Return columns (u, k) of mean square 1 together; None where there is nothing to ask."""
@@ -64,33 +51,10 @@ class Question:
         return leading(kernel * len(kernel) / np.trace(kernel), self.rank)
 
 
-class Asked(Protocol):
-    """A question that is asked of the discrepancy."""
-
-    @property
-    def name(self) -> str:
-        """As a person reads it after "depends on"."""
-
-    def features(self, conditions: Mapping[str, Array]) -> Array | None:
-        """Return columns (u, k) of mean square 1 together; None where there is nothing to ask."""
-
-
 def leading(kernel: Array, rank: int) -> Array:
     """Return the columns (u, k), k <= rank, that hold most of a kernel (u, u)."""
-    left, sizes, _ = np.linalg.svd(low_rank(kernel, WIDER * rank), full_matrices=False)
+    left, sizes, _ = np.linalg.svd(low_rank(kernel, WIDER * rank)[0], full_matrices=False)
     return np.asarray(left[:, :rank] * sizes[:rank])
-
-
-def low_rank(kernel: Array, rank: int) -> Array:
-    """Return L (u, k) with L L^T nearly a kernel (u, u), k <= rank, by pivoted Cholesky."""
-    left = np.diag(kernel).astype(float)
-    whole, columns = left.sum(), np.zeros((len(kernel), 0))
-    while columns.shape[1] < rank and left.sum() > LEAST * whole:
-        at = int(np.argmax(left))
-        column = (kernel[:, at] - columns @ columns[at]) / np.sqrt(left[at])
-        columns = np.column_stack([columns, column])
-        left = np.maximum(left - column**2, 0.0)
-    return columns
 
 
 def scaled(values: Array) -> Array:
@@ -126,75 +90,49 @@ def unresolved(features: Array) -> Array:
     return np.maximum(1.0 - np.sum(features**2, axis=1), 0.0)
 
 
-def drift_features(table: Observations) -> Array:
-    """Columns (u, k) of an instrument's slow drift, afresh in every session.
-
-    Ornstein-Uhlenbeck over true time.  Zero where no time is told.
-    """
-    parts = [np.zeros((table.n_units, 0))]
-    for session in np.unique(table.sessions) if table.time_s is not None else ():
-        at = table.sessions == session
-        apart = np.abs(table.times[at][:, None] - table.times[at])
-        kernel = np.asarray(sum(np.exp(-apart / each) for each in DRIFT_S) / len(DRIFT_S))
-        own = low_rank(kernel, DRIFT_RANK)
-        parts.append(np.zeros((table.n_units, own.shape[1])))
-        parts[-1][at] = own
-    return np.concatenate(parts, axis=1)
+def drift_features(times: Array) -> Array:
+    """Columns (u, k) of an instrument's slow drift in one session: Ornstein-Uhlenbeck over time."""
+    apart = np.abs(times[:, None] - times)
+    kernel = np.asarray(sum(np.exp(-apart / each) for each in DRIFT_S) / len(DRIFT_S))
+    return low_rank(kernel, DRIFT_RANK)[0]
 
 
 def background(
-    table: Observations,
-    whiten: Callable[[Array], Array],
-    questions: Sequence[Asked],
+    units: Whitened,
+    questions: Iterable[Question | Smooth],
     scatter: Array,
-    drift: Array | None,
     noise_width: float,
+    drift: Array,
     wander: Array | None = None,
     passing: Array | None = None,
 ) -> Background:
     """Put together what has no name.
 
-    Parameters
-    ----------
-    table : Observations
-        u units of m components.
-    whiten : callable
-        (u, m, k) -> (N, k).
-    questions : sequence of Question
-        Asked of the discrepancy.
-    scatter : (m,) float
-        Usual scatter of a unit: what amplitudes are measured in.
-    drift : (m,) float or None
-        Expected size of the instrument's drift; None where the order of the rows is no time.
-    noise_width : float
-        See `Background`.
-    wander : (u, k) float, optional
-        Columns of that drift.
-    passing : (u, k) float, optional
-        Columns of what the instrument drifts within seconds.
+    `units`: u units of m components; `questions`: asked of the discrepancy; `scatter` (m,): usual
+    scatter of a unit: what amplitudes are measured in; `noise_width`: see `Background`; `drift`
+    (m,): expected size of the instrument's drift; `wander` (u, k): columns of that drift; none
+    where the order of the rows is no time; `passing` (u, k): columns of what the instrument drifts
+    within seconds.
     """
-    groups: list[Group] = []
-
-    def add(name: str, features: Array, size: Array, expected: float) -> None:
+    table = units.observations
+    asked = [(each.name, each.features(table.covariates), scatter, 0.0) for each in questions]
+    kinds = (
+        (SLOW_DRIFT, wander, drift, 1.0),
+        *asked,
+        (PASSING_DRIFT, passing, PASSING * drift, 1.0),
+    )
+    groups = []
+    for name, features, size, expected in kinds:
+        if features is None:
+            continue
         for quantity in table.quantities:
             at = list(quantity.components)
-            spread = np.zeros((*table.values.shape, features.shape[1], len(at)))
-            for number, component in enumerate(at):
-                spread[:, component, :, number] = features * size[component]
-            columns = whiten(spread.reshape(*table.values.shape, -1))
+            own = np.zeros(table.n_components)
+            own[at] = size[at]
+            spread = features[:, None, :, None] * np.diag(own)[:, None, at]
+            columns = units.whiten(spread.reshape(*table.values.shape, -1))
             if np.any(columns):
-                own = np.zeros(table.n_components)
-                own[at] = size[at]
                 groups.append(
                     Group(name, quantity.name, columns, expected, features=features, size=own)
                 )
-
-    if drift is not None and wander is not None:
-        add(SLOW_DRIFT, wander, drift, 1.0)
-    for question in questions:
-        features = question.features(table.covariates)
-        if features is not None:
-            add(question.name, features, scatter, 0.0)
-    if drift is not None and passing is not None:
-        add(PASSING_DRIFT, passing, PASSING * drift, 1.0)
     return Background(tuple(groups), noise_width)

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,38 +45,27 @@ OFF = 1e-3
 """Amplitude of a group that is absent, in scatters of a unit."""
 
 
-def log_size_prior(square: float, count: int) -> float:
+def log_size_prior(square: Any, count: int) -> Any:
     """Return the log density of an effect's `count` unknowns whose squares sum up to `square`."""
     density = gammaln(0.5 * (TAIL + count)) - gammaln(0.5 * TAIL)
     density -= 0.5 * count * np.log(TAIL * np.pi)
-    return float(density - 0.5 * (TAIL + count) * np.log1p(square / TAIL))
+    return density - 0.5 * (TAIL + count) * np.log1p(square / TAIL)
 
 
-def size_weight(square: float, count: int) -> float:
+def size_weight(square: Any, count: int) -> Any:
     """Return the square of the Gaussian weight that has the slope of that prior."""
     return (TAIL + count) / (TAIL + square)
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A set of effects at its best amplitudes.
+    """A set of effects at its best amplitudes."""
 
-    Parameters
-    ----------
-    point : Point
-        Where its fit ended.
-    background : Background
-        Of the table.
-    amplitude : (g,) float
-        Of the groups.
-    excess : float
-        Variance of what is left of each number once everything is explained, in units of its known
-        noise.
-    """
-
-    point: Point
-    background: Background
-    amplitude: Array
+    point: Point  # where its fit ended
+    background: Background  # of the table
+    amplitude: Array  # (g,), of the groups
+    # variance of what is left of each number once everything is explained, in units of its known
+    # noise
     excess: float
 
     @cached_property
@@ -166,10 +156,7 @@ class Evidence:
 
         What has no name is integrated, at the amplitudes and with the law errors of this set.
 
-        Parameters
-        ----------
-        point : Point
-            Like this one's, anywhere.
+        `point`: like this one's, anywhere.
         """
         p = len(self.point.z)
         information = self._known[0][p:, p:] / self.excess + np.diag(self.precision[p:])
@@ -311,12 +298,7 @@ class Evidence:
     def left_of(self, quantity: str, count: int) -> float:
         """Return the variance of a quantity that is not explained, in units of its known noise.
 
-        Parameters
-        ----------
-        quantity : str
-            Name of a quantity of the table.
-        count : int
-            Measured numbers of it.
+        `quantity`: name of a quantity of the table; `count`: measured numbers of it.
         """
         own = [each.quantity == quantity for each in self.background.groups]
         parts = self.energies * self.discrepant
@@ -337,10 +319,7 @@ class Evidence:
         would still explain where the laws are as wrong as they may be, over that of the effect
         itself; both beyond what everything else with a name could take up.
 
-        Parameters
-        ----------
-        name : str
-            Of an effect of the set.
+        `name`: of an effect of the set.
         """
         point, places = self.point, self.point.effects[name]
         wrong = self._solved[2][len(point.z) : len(self._priors[0])]
@@ -374,16 +353,9 @@ class Evidence:
     def strength(self, columns: Array) -> float:
         """Return how many standard deviations unknowns of typical size leave beyond the rest.
 
-        Parameters
-        ----------
-        columns : (N, k) float
-            As for `gains`.
+        `columns` (N, k): as for `gains`.
         """
-        factor, scale, _, _ = self._solved
-        mixed = solve_triangular(
-            factor, scale[:, None] * self.products(columns), lower=True, check_finite=False
-        )
-        information = (columns.T @ columns - mixed.T @ mixed / self.excess) / self.excess
+        ((information, _),) = self._scores([columns])
         return float(np.sqrt(max(np.linalg.eigvalsh(information)[-1], 0.0)))
 
     def gains(
@@ -391,108 +363,116 @@ class Evidence:
     ) -> list[tuple[float, Array]]:
         """Return what effects would each add to the log evidence, to first order.
 
-        Parameters
-        ----------
-        blocks : sequence of (N, k) arrays
-            Change of what is left by the unknowns of each effect, whitened, in standard deviations
-            of their priors.
-        possible : sequence of Possible, optional
-            What these unknowns can be; anything by default.
-
-        Returns
-        -------
-        list of (float, (k,) array)
-            Gain, the amplitudes as they are, and the unknowns.
+        `blocks` (N, k): change of what is left by the unknowns of each effect, whitened, in
+        standard deviations of their priors; `possible`: what these unknowns can be; anything by
+        default.
+        Returns the gain of each, the amplitudes as they are, and its unknowns (k,).
         """
-        factor, scale, step, _ = self._solved
-        counts = [each.shape[1] for each in blocks]
-        columns = np.concatenate(blocks, axis=1)
-        products = self.products(columns)
-        mixed = solve_triangular(factor, scale[:, None] * products, lower=True, check_finite=False)
-        slope = -(columns.T @ self.point.left + products.T @ step) / self.excess
-        ends = np.cumsum(counts)
+        scores = self._scores(blocks)
+        alike: dict[int, list[int]] = {}
+        for place, (_, slope) in enumerate(scores):
+            alike.setdefault(len(slope), []).append(place)
+        free: dict[int, tuple[float, Array, Array]] = {}
+        for places in alike.values():
+            own = modes(*(np.array([scores[place][k] for place in places]) for k in (0, 1)))
+            free.update(zip(places, zip(*own, strict=True), strict=True))
+        bounds: Sequence[Possible | None] = possible or [None] * len(blocks)
         found = []
-        for n, (first, end) in enumerate(zip(ends - counts, ends, strict=True)):
-            own, beside = columns[:, first:end], mixed[:, first:end]
-            information = (own.T @ own - beside.T @ beside / self.excess) / self.excess
-            found.append(_gain(information, slope[first:end], possible[n] if possible else None))
+        for n, (information, slope) in enumerate(scores):
+            gain, z, precision = free[n]
+            found.append(_gain(information, slope, gain, z, precision, bounds[n]))
         return found
+
+    def _scores(self, blocks: Sequence[Array]) -> list[tuple[Array, Array]]:
+        """Return the scores of blocks of further columns (N, k)."""
+        columns = np.concatenate(blocks, axis=1)
+        grams = [each.T @ each for each in blocks]
+        return self.scores(self.products(columns), columns.T @ self.point.left, grams)
 
     def scores(
         self, mixed: Array, target: Array, blocks: Sequence[Array]
     ) -> list[tuple[Array, Array]]:
         """Return information (k, k) and slope (k,) of blocks of further columns, where they are 0.
 
-        Parameters
-        ----------
-        mixed : (K, q) float
-            Products of all columns of the set with the q further ones.
-        target : (q,) float
-            Products of these with what the fit left.
-        blocks : sequence of (k, k) arrays
-            Products of the columns of each block, q in all.
+        `mixed` (K, q): products of all columns of the set with the q further ones; `target` (q,):
+        products of these with what the fit left; `blocks` (k, k): products of the columns of each
+        block, q in all.
         """
         factor, scale, step, _ = self._solved
         beside = solve_triangular(factor, scale[:, None] * mixed, lower=True, check_finite=False)
         slope = -(target + mixed.T @ step) / self.excess
         ends = np.cumsum([len(each) for each in blocks])
-        return [
-            (
-                (
-                    own
-                    - beside[:, end - len(own) : end].T
-                    @ beside[:, end - len(own) : end]
-                    / self.excess
-                )
-                / self.excess,
-                slope[end - len(own) : end],
-            )
-            for own, end in zip(blocks, ends, strict=True)
-        ]
+        found = []
+        for own, end in zip(blocks, ends, strict=True):
+            at = slice(end - len(own), end)
+            information = (own - beside[:, at].T @ beside[:, at] / self.excess) / self.excess
+            found.append((information, slope[at]))
+        return found
 
 
-def _gain(information: Array, slope: Array, possible: Possible | None) -> tuple[float, Array]:
-    """Return the gain of an effect and its unknowns: Laplace's method at the better of two modes.
+def _gain(
+    information: Array,
+    slope: Array,
+    gain: float,
+    z: Array,
+    precision: Array,
+    possible: Possible | None,
+) -> tuple[float, Array]:
+    """Return the gain of an effect and its unknowns within bounds; `modes` tells those without.
 
-    The prior has a peak and tails: a large effect is found from the side of the tails.  Unknowns
-    that would go beyond what is possible stay at the bound, and their room to move is none.
+    Unknowns that would go beyond what is possible stay at the bound, and their room to move is
+    none.
     """
-    z, free = np.zeros(len(slope)), np.ones(len(slope), dtype=bool)
     if possible is None:
-        gain, z, _ = _best_mode(information, slope)
-        return gain, z
-    while True:
-        rest = slope - information @ np.where(free, 0.0, z)
-        gain, z[free], whole = _best_mode(information[np.ix_(free, free)], rest[free])
-        beyond = free & ((z < possible.lower) | (z > possible.upper))
-        if not beyond.any():
-            break
+        return float(gain), z
+    free = np.ones(len(z), dtype=bool)
+    while (beyond := free & ((z < possible.lower) | (z > possible.upper))).any():
         free &= ~beyond
         z = np.clip(z, possible.lower, possible.upper)
+        rest = slope - information @ np.where(free, 0.0, z)
+        (gain,), (z[free],), (precision,) = modes(
+            information[np.ix_(free, free)][None], rest[None, free]
+        )
     if not free.any():
         # What stays at its bounds keeps its prior: data that say no more are no evidence.
         return gain + float(slope @ z - 0.5 * z @ information @ z), z
     covariance = np.eye(len(z))
-    covariance[np.ix_(free, free)] = np.linalg.inv(whole)
+    covariance[np.ix_(free, free)] = np.linalg.inv(precision)
     held = np.where(free, 0.0, z)
     gain += float(slope @ held - 0.5 * held @ information @ held)
     return gain + possible.gain(z, covariance), z
 
 
-def _best_mode(information: Array, slope: Array) -> tuple[float, Array, Array]:
-    modes = (_mode(information, slope, near) for near in (1.0, 1e-8))
-    return max(modes, key=lambda each: each[0])
+def modes(information: Array, slope: Array) -> tuple[Array, Array, Array]:
+    """Return gains (n,), unknowns (n, k) and their precision (n, k, k) of n effects by themselves.
+
+    Laplace's method at the better of two modes.  The prior has a peak and tails: a large effect is
+    found from the side of the tails.
+
+    `information` (n, k, k), `slope` (n, k): of the log likelihood, where the effects are absent.
+    """
+    count = slope.shape[1]
+    found = []
+    for weight in (np.full(len(slope), 1.0), np.full(len(slope), 1e-8)):
+        for _ in range(5):
+            whole = information + weight[:, None, None] * np.eye(count)
+            z = np.asarray(np.linalg.solve(whole, slope[..., None])[..., 0], dtype=np.float64)
+            square = _dots(z, z)
+            weight = size_weight(square, count)
+        fits = _dots(slope, z) - 0.5 * _dots((z[:, None] @ information)[:, 0], z)
+        prior = log_size_prior(square, count) + 0.5 * count * np.log(2.0 * np.pi)
+        found.append((fits + prior - 0.5 * np.linalg.slogdet(whole)[1], z, whole))
+    better = found[0][0] >= found[1][0]
+    gains, unknowns, precision = (
+        np.where(better.reshape(-1, *(1,) * (one.ndim - 1)), one, other)
+        for one, other in zip(*found, strict=True)
+    )
+    return gains, unknowns, precision
 
 
-def _mode(information: Array, slope: Array, weight: float) -> tuple[float, Array, Array]:
-    count = len(slope)
-    for _ in range(5):
-        whole = information + weight * np.eye(count)
-        z = np.linalg.solve(whole, slope)
-        weight = size_weight(float(z @ z), count)
-    fits = float(slope @ z - 0.5 * z @ information @ z)
-    prior = log_size_prior(float(z @ z), count) + 0.5 * count * np.log(2.0 * np.pi)
-    return fits + prior - 0.5 * float(np.linalg.slogdet(whole)[1]), np.asarray(z), whole
+def _dots(one: Array, other: Array) -> Array:
+    """Return the products of vectors (n, k) with others, (n,)."""
+    return np.asarray((one[:, None] @ other[:, :, None])[:, 0, 0])
 
 
 def known_noise(point: Point, background: Background) -> Evidence:

@@ -30,18 +30,10 @@ GIVES = 0.2
 
 @dataclass(frozen=True)
 class Give:
-    """In which way the law of an effect gives.
+    """In which way the law of an effect gives."""
 
-    Parameters
-    ----------
-    name : str
-        Of the effect.
-    way : str
-        One of `WAYS`.
-    """
-
-    name: str
-    way: str
+    name: str  # of the effect
+    way: str  # one of `WAYS`
 
 
 def told(way: str, value: float, sigma: float) -> str:
@@ -57,17 +49,9 @@ def told(way: str, value: float, sigma: float) -> str:
 def given(change: Array, scale: Array) -> Array:
     """Return what an effect does in addition for each way of giving, of 1 standard deviation.
 
-    Parameters
-    ----------
-    change : (u, m) float
-        What it does to each unit by its law.
-    scale : (m,) float
-        Size of each component, to compare them.
-
-    Returns
-    -------
-    (u, m, 2) float
-        In the order of `WAYS`.
+    `change` (u, m): what it does to each unit by its law; `scale` (m,): size of each component, to
+    compare them.
+    Returns (u, m, 2) in the order of `WAYS`.
     """
     told = np.nan_to_num(change) / scale
     side = np.sign(told @ np.linalg.svd(told, full_matrices=False)[2][0])

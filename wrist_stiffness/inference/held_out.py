@@ -11,37 +11,46 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.inference.blocks import time_blocks
-from wrist_stiffness.inference.observations import Array, Mask, Observations, Quantity
+from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations, Quantity
+
+HELD_OUT = 0.2
+"""Part of the units that judges where there is one session only (assumed)."""
 
 JUDGES = 8
 """Blocks of the sealed part from which the uncertainty of a gain is taken."""
 
 
-def sealed_units(observations: Observations, share: float) -> Mask:
+def time_blocks(sessions: Labels, wanted: int) -> Labels:
+    """Cut the units into blocks of neighbours that never span two sessions, (n,)."""
+    blocks = np.empty(len(sessions), dtype=np.int64)
+    names = np.unique(sessions)
+    number = 0
+    for session in names:
+        places = np.flatnonzero(sessions == session)
+        share = max(1, round(wanted * len(places) / len(sessions)))
+        for piece in np.array_split(places, min(share, len(places))):
+            blocks[piece] = number
+            number += 1
+    return blocks
+
+
+def sealed_units(observations: Observations) -> Mask:
     """Which units are put aside: the last session, or the end of the only one, (n,)."""
     sessions = observations.sessions
     names = np.unique(sessions)
     if len(names) > 1:
         return sessions == names[-1]
     n = observations.n_units
-    return np.arange(n) >= n - max(1, round(share * n))
+    return np.arange(n) >= n - max(1, round(HELD_OUT * n))
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Residuals of a model on units that it has not seen.
+    """Residuals of a model on units that it has not seen."""
 
-    Parameters
-    ----------
-    residual : (n, m) array
-        In the units of the table; NaN = not measured.
-    white : (N,) array
-        Whitened, without what the set-up of the session could still take up: where a wander or a
-        registration goes after the end of the data is no evidence against an effect.
-    """
-
-    residual: Array
+    residual: Array  # (n, m), in the units of the table; NaN = not measured
+    # (N,), whitened, without what the set-up of the session could still take up: where a wander or
+    # a registration goes after the end of the data is no evidence against an effect
     white: Array
 
     @property
@@ -79,19 +88,14 @@ def refuted(before: HeldOut, after: HeldOut) -> bool:
 def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, float]:
     """Fall of the held-out error of a quantity and its standard uncertainty.
 
-    Parameters
-    ----------
-    before, after : HeldOut
-        Without and with the effect.
-    quantity : Quantity
-        What is told.
+    `before`, `after`: without and with the effect; `quantity`: what is told.
     """
     fall = before.squares(quantity) - after.squares(quantity)
     measured = np.isfinite(fall)
     if not measured.any():
         return 0.0, 0.0
-    blocks = time_blocks(np.zeros(int(measured.sum()), dtype=np.int64), JUDGES)
-    means = np.array([fall[measured][blocks == block].mean() for block in np.unique(blocks)])
+    blocks = np.array_split(fall[measured], min(JUDGES, int(measured.sum())))
+    means = np.array([block.mean() for block in blocks])
     error = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
     level = before.rmse(quantity) + after.rmse(quantity)
     slope = quantity.per_si**2 / level if level > 0 else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.optimize import minimize
 
-from wrist_stiffness.inference.candidates import Candidate
+from wrist_stiffness.inference.candidates import (
+    Candidate,
+    Nuisance,
+    nuisance_columns,
+)
 from wrist_stiffness.inference.evidence import size_weight
-from wrist_stiffness.inference.nuisance import Nuisance, NuisanceColumns, nuisance_columns
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
@@ -34,37 +37,19 @@ Shape = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Term:
-    """A candidate in a set.
+    """A candidate in a set."""
 
-    Parameters
-    ----------
-    candidate : Candidate
-        Which.
-    shape : tuple of float
-        Where it is not linear.
-    """
-
-    candidate: Candidate
-    shape: Shape
+    candidate: Candidate  # which
+    shape: Shape  # where it is not linear
 
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """A set of candidates fitted whole to a table.
+    """A set of candidates fitted whole to a table."""
 
-    Parameters
-    ----------
-    problem : LinearProblem
-        What was fitted to.
-    terms : dict of str to Term
-        The set.
-    z : (p,) float
-        Nuisances and parameters, in the standard deviations of their priors.
-    """
-
-    problem: LinearProblem
-    terms: Mapping[str, Term]
-    z: Array
+    problem: LinearProblem  # what was fitted to
+    terms: Mapping[str, Term]  # the set
+    z: Array  # (p,), nuisances and parameters, in the standard deviations of their priors
 
     @property
     def names(self) -> Collection[str]:
@@ -112,30 +97,28 @@ class LinearFit:
         )
 
 
-@dataclass(eq=False)
 class LinearProblem:
     """A table, its candidates and its nuisances as the search asks them.
 
-    Parameters
-    ----------
-    table : Table
-        Whitened.
-    candidates : sequence of Candidate
-        The catalogue.
-    nuisances : NuisanceColumns
-        Over that table.
+    `observations`: without lost units; `candidates`, `nuisances`: the catalogue, and what is
+    refitted; `ordered`: whether the rows follow each other in time.
     """
 
-    table: Table
-    candidates: Sequence[Candidate]
-    nuisances: NuisanceColumns
-    sizes: dict[str, Array] = field(init=False)
-    _evaluated: dict[tuple[str, Shape], Array] = field(init=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Whiten the base and take its sizes."""
-        table = self.table
-        self.white: Array = table.whiten(np.nan_to_num(table.observations.values))
+    def __init__(
+        self,
+        observations: Observations,
+        candidates: Sequence[Candidate],
+        nuisances: Sequence[Nuisance],
+        ordered: bool,
+    ) -> None:
+        self.observations = observations
+        self.laws = {each.name: each for each in candidates}
+        self.nuisances = nuisance_columns(observations, tuple(nuisances))
+        self._evaluated: dict[tuple[str, Shape], Array] = {}
+        blocks = [self.evaluate(each, shape) for each in candidates for shape in each.shapes]
+        named = np.concatenate([np.zeros((*observations.values.shape, 0)), *blocks], axis=2)
+        self.table = table = Table(observations, self.nuisances.columns, named, ordered)
+        self.white: Array = table.whiten(observations.values)
         bare = table.whiten(self.nuisances.columns)
         norm = np.linalg.norm(bare, axis=0)
         much = FREE * max(float(np.linalg.norm(self.white)), 1.0)
@@ -143,9 +126,9 @@ class LinearProblem:
         prior = self.nuisances.prior_std
         self.base_sizes: Array = np.where(np.isfinite(prior), prior, free)
         self._base = bare * self.base_sizes
-        self._by_name = {each.name: each for each in self.candidates}
-        self.sizes = {each.name: self._sizes(each) for each in self.candidates}
-        self._trials = [self._trial(each) for each in self.candidates]
+        beside = float(np.linalg.norm(self.white - self._base @ self.begin().z))
+        self.sizes = {each.name: self._sizes(each, beside) for each in candidates}
+        self._trials = [self._trial(each) for each in candidates]
 
     @property
     def n_nuisances(self) -> int:
@@ -158,7 +141,7 @@ class LinearProblem:
         terms = []
         for each in self._trials:
             for shape, _ in each.blocks:
-                term = Term(self._by_name[each.name], shape)
+                term = Term(self.laws[each.name], shape)
                 alone = self.fitted({each.name: term})
                 # What its bounds forbid explains nothing, and leaves that to the discrepancy.
                 if not self.held(alone)[alone.places[each.name]].all():
@@ -204,7 +187,7 @@ class LinearProblem:
     def added(self, fit: LinearFit, ranked: Ranked) -> LinearFit | None:
         """Return the best fit with one effect more; None where its bounds leave nothing of it."""
         name = ranked.trial.name
-        candidate = self._by_name[name]
+        candidate = self.laws[name]
         terms = {**fit.terms, name: Term(candidate, ranked.shape)}
         if candidate.shape:
             terms[name] = Term(candidate, self._best_shape(fit, terms, name))
@@ -219,7 +202,7 @@ class LinearProblem:
         """Return the columns of a candidate over the table, (n, m, k)."""
         key = (candidate.name, shape)
         if key not in self._evaluated:
-            self._evaluated[key] = candidate.evaluate(self.table.observations, shape)
+            self._evaluated[key] = candidate.evaluate(self.observations, shape)
         return self._evaluated[key]
 
     def columns(self, terms: Sequence[Term]) -> Array:
@@ -311,24 +294,15 @@ class LinearProblem:
         blocks = [(shape, -self._whitened(candidate, shape)) for shape in candidate.shapes]
         return Trial(candidate.name, True, tuple(blocks), self.possible(candidate))
 
-    def _sizes(self, candidate: Candidate) -> Array:
-        """Return the scales of the priors of the parameters, (k,)."""
+    def _sizes(self, candidate: Candidate, beside: float) -> Array:
+        """Return the scales of the priors of the parameters, (k,); the base leaves `beside`."""
         stated = [each.scale or each.plausible for each in candidate.parameters]
         if all(stated):
             return np.array(stated, dtype=float)
         middle = candidate.shapes[len(candidate.shapes) // 2]
         norm = np.linalg.norm(self.table.whiten(self.evaluate(candidate, middle)), axis=0)
-        left = self.white - self._base @ self.begin_z
-        much = float(np.linalg.norm(left)) / np.where(norm > 0.0, norm, 1.0)
+        much = beside / np.where(norm > 0.0, norm, 1.0)
         return np.array([own or size for own, size in zip(stated, much, strict=True)])
-
-    @cached_property
-    def begin_z(self) -> Array:
-        """The base alone, fitted."""
-        base = self._base
-        return _solved(
-            base.T @ base, base.T @ self.white, {}, np.zeros(base.shape[1], bool), np.zeros(0)
-        )
 
 
 def _simplex(begin: Array, bounds: Sequence[tuple[float, float]]) -> Array:
@@ -346,7 +320,7 @@ def _solved(
     z: Array,
 ) -> Array:
     """Return the most probable unknowns where those that are held stay, (p,)."""
-    z = np.where(held, z, 0.0) if len(z) else np.zeros(len(target))
+    z = np.where(held, z, 0.0)
     if not len(target):
         return z
     # The tails of the priors first: a large effect is found from their side.
@@ -362,27 +336,3 @@ def _solved(
         for places in effects.values():
             weight[places] = size_weight(float(np.sum(z[places] ** 2)), len(places))
     return z
-
-
-def linear_problem(
-    observations: Observations,
-    candidates: Sequence[Candidate],
-    nuisances: Sequence[Nuisance],
-    ordered: bool,
-) -> LinearProblem:
-    """Make a table ready for the search.
-
-    Parameters
-    ----------
-    observations : Observations
-        Without lost units.
-    candidates, nuisances : sequence
-        The catalogue, and what is refitted.
-    ordered : bool
-        Whether the rows follow each other in time.
-    """
-    base = nuisance_columns(observations, tuple(nuisances))
-    blocks = [each.evaluate(observations, s) for each in candidates for s in each.shapes]
-    nothing = np.zeros((*observations.values.shape, 0))
-    table = Table(observations, base.columns, np.concatenate([nothing, *blocks], axis=2), ordered)
-    return LinearProblem(table, candidates, base)

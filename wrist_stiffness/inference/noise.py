@@ -1,5 +1,7 @@
 """The scatter of a table: from what was repeated, or from what everything together leaves."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wrist_stiffness.inference.observations import Array, Observations
@@ -24,21 +26,11 @@ def replicate_variance(
     between conditions cannot reach the differences inside a group.  Nothing is weighted: a
     large value common to a group would not cancel under weights that differ.
 
-    Parameters
-    ----------
-    values : (n, m) array
-        Observations, zero where not measured.
-    columns : (n, m, q) array
-        Base and candidates, zero where not measured.
-    observations : Observations
-        With `replicate` labels; groups never span sessions.
-
-    Returns
-    -------
-    (m,) array
-        Variance of one unit; one for a component that was never measured.
-    float
-        Fewest degrees of freedom over the components; zero without replicates.
+    `values` (n, m): observations, zero where not measured; `columns` (n, m, q): base and
+    candidates, zero where not measured; `observations`: with `replicate` labels; groups never span
+    sessions.
+    Returns (m,) variance of one unit; one for a component that was never measured, and fewest
+    degrees of freedom over the components; zero without replicates.
     """
     m = observations.n_components
     if observations.replicate is None or not (observations.replicate >= 0).any():
@@ -75,22 +67,36 @@ def replicate_variance(
     return np.where(seen, variance, 1.0), float(freedom[seen].min())
 
 
+def in_each_component(features: Sequence[Array | None], observations: Observations) -> Array:
+    """Return what features (n, k), where there are any, may do to each component, (n, m, q)."""
+    found = [np.zeros((observations.n_units, 0)), *(each for each in features if each is not None)]
+    unit = np.eye(observations.n_components)[:, None, :]
+    spread = np.concatenate(found, axis=1)[:, None, :, None] * unit
+    return np.asarray(spread.reshape(*observations.values.shape, -1))
+
+
+def unstated(
+    observations: Observations, base: Array, structure: Array, known: float, unknown: float
+) -> tuple[Array, float]:
+    """Return the variance of a unit (m,) that nothing states, and how well it is known.
+
+    `observations`, `base`, `structure`: as for `scatter_of`; `known`, `unknown`: least standard
+    deviation of the logarithm of the variance where repeats tell it, and that where none do.
+    """
+    variance, repeats = scatter_of(observations, base, structure)
+    if not repeats:
+        return variance, unknown
+    seen = observations.measured.any(axis=0).sum()
+    return variance, max(float(np.sqrt(2.0 / (repeats * seen))), known)
+
+
 def scatter_of(observations: Observations, base: Array, structure: Array) -> tuple[Array, float]:
     """Variance of one unit, by repeated conditions or else by what everything together leaves.
 
-    Parameters
-    ----------
-    observations : Observations
-        Values, to be explained.
-    base, structure : (n, m, p) and (n, m, q) array
-        Columns of what is refitted, and of what else could be behind the values.
-
-    Returns
-    -------
-    (m,) array
-        Variance of each component, drawn to the mean of its quantity.
-    float
-        Degrees of freedom of the repeats in each component, 0 where there are too few.
+    `observations`: values, to be explained; `base` (n, m, p), `structure` (n, m, q): columns of
+    what is refitted, and of what else could be behind the values.
+    Returns (m,) variance of each component, drawn to the mean of its quantity, and degrees of
+    freedom of the repeats in each component, 0 where there are too few.
     """
     measured = observations.measured
     values = np.where(measured, observations.values, 0.0)
@@ -127,14 +133,8 @@ def rich_basis(base: Array, structure: Array, n_measured: int) -> Array:
     All of the base is in it: registrations and tolerances are far above the scatter, so that what
     a rough basis leaves of them would pass for it.
 
-    Parameters
-    ----------
-    base : (N, p) array
-        Weighted nuisance columns.
-    structure : (N, q) array
-        Weighted columns of all candidates.
-    n_measured : int
-        Measured numbers.
+    `base` (N, p): weighted nuisance columns; `structure` (N, q): weighted columns of all
+    candidates; `n_measured`: measured numbers.
     """
     first = orthonormal(base)
     beyond = structure - first @ (first.T @ structure)

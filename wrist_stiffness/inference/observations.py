@@ -6,6 +6,7 @@ counts as a measurement of its own: the mean over one dwell, or one sample.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,10 @@ from wrist_stiffness.errors import InputError
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+
+LABELS = ("time_s", "session", "replicate", "samples", "stand")
+"""Columns (n,) of a table, where it has them, beside its conditions."""
 
 
 @dataclass(frozen=True)
@@ -100,15 +105,8 @@ class Observations:
         n, m = self.values.shape
         if np.isinf(self.values).any():
             raise InputError("values contain an infinite number; write NaN for 'not measured'")
-        per_unit = {
-            "time_s": self.time_s,
-            "session": self.session,
-            "replicate": self.replicate,
-            "samples": self.samples,
-            "row": self.row,
-            "stand": self.stand,
-            **{f"covariate {name!r}": column for name, column in self.covariates.items()},
-        }
+        per_unit = {name: getattr(self, name) for name in (*LABELS, "row")}
+        per_unit |= {f"covariate {name!r}": column for name, column in self.covariates.items()}
         for name, column in per_unit.items():
             if column is not None and column.shape != (n,):
                 raise InputError(f"{name} has shape {column.shape}, but there are {n} units")
@@ -189,24 +187,15 @@ class Observations:
 
     def take(self, rows: Mask | Labels) -> "Observations":
         """Those units only, in the order given by `rows`."""
-
-        def some(column: NDArray | None) -> NDArray | None:
-            return None if column is None else column[rows]
-
-        per_unit = self.covariance is not None and self.covariance.ndim == 3
-        return Observations(
-            self.values[rows],
-            {name: column[rows] for name, column in self.covariates.items()},
-            some(self.covariance) if per_unit else self.covariance,
-            some(self.time_s),
-            some(self.session),
-            some(self.replicate),
-            some(self.samples),
-            self.quantities,
-            self.rows[rows],
-            some(self.stand),
-            some(self.shared),
-            some(self.common),
+        own = {name: getattr(self, name) for name in (*LABELS, "shared", "common")}
+        taken: dict[str, Any] = {
+            name: column if column is None else column[rows] for name, column in own.items()
+        }
+        if self.covariance is not None and self.covariance.ndim == 3:
+            taken["covariance"] = self.covariance[rows]
+        covariates = {name: column[rows] for name, column in self.covariates.items()}
+        return replace(
+            self, values=self.values[rows], covariates=covariates, row=self.rows[rows], **taken
         )
 
     def with_values(self, values: Array) -> "Observations":

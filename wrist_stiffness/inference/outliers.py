@@ -5,6 +5,13 @@ import numpy as np
 from wrist_stiffness.inference.observations import Array, Mask, Observations
 from wrist_stiffness.inference.projection import leading_directions
 
+FEWEST_UNITS = 12
+"""From fewer units noise cannot be told from error, nor a lost beam from a good one (assumed)."""
+
+OUTLIER_LIMIT = 7.0
+"""Robust standard deviations from a rich model beyond which a unit is lost (the benchmarks came out
+better)."""
+
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of a Gaussian over its median absolute deviation."""
 
@@ -33,24 +40,13 @@ def robust_scale(values: Array) -> Array:
 
 
 def lost_units(observations: Observations, columns: Array, limit: float) -> Mask:
-    """Which units lie far from a model with everything in it.
+    """Return which units lie far from a model with everything in it, (n,).
 
     Iteratively reweighted least squares with Tukey's biweight on the distance of the whole unit,
     so that one lost beam of a hundred does not pull the fit.
 
-    Parameters
-    ----------
-    observations : Observations
-        Table.
-    columns : (n, m, p) array
-        Base and candidates.
-    limit : float
-        Robust standard deviations beyond which a unit is lost.
-
-    Returns
-    -------
-    (n,) array of bool
-        True = lost.
+    `observations`: table; `columns` (n, m, p): base and candidates; `limit`: robust standard
+    deviations beyond which a unit is lost.
     """
     n, m = observations.values.shape
     measured = observations.measured

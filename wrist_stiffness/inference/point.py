@@ -26,33 +26,18 @@ spread evenly over the groups of the discrepancy."""
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Columns of one kind that have no name, with one amplitude.
+    """Columns of one kind that have no name, with one amplitude."""
 
-    Parameters
-    ----------
-    name : str
-        What they depend on.
-    quantity : str
-        Name of the quantity that they change.
-    columns : (N, k) float
-        Whitened, for an amplitude of 1.
-    expected : float
-        Amplitude that is expected, of an instrument's drift; 0 for a discrepancy, which may be
-        absent.
-    width : float
-        Standard deviation of the logarithm of the amplitude about the expected one.
-    features : (u, k / c) float, optional
-        The same of each unit, before it changed the c components of the quantity.
-    size : (m,) float, optional
-        What that is of each component; 0 for those of other quantities.
-    """
-
-    name: str
-    quantity: str
-    columns: Array
+    name: str  # what they depend on
+    quantity: str  # name of the quantity that they change
+    columns: Array  # (N, k), whitened, for an amplitude of 1
+    # amplitude that is expected, of an instrument's drift; 0 for a discrepancy, which may be absent
     expected: float = 0.0
+    # standard deviation of the logarithm of the amplitude about the expected one
     width: float = 1.0
+    # (u, k / c), the same of each unit, before it changed the c components of the quantity
     features: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    # (m,), what that is of each component; 0 for those of other quantities
     size: Array = field(default_factory=lambda: np.zeros(0))
 
     def change(self, values: Array) -> Array:
@@ -65,27 +50,15 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Background:
-    """All groups of a table, put together once for all sets of effects.
+    """All groups of a table, put together once for all sets of effects."""
 
-    Parameters
-    ----------
-    groups : tuple of Group
-        None where nothing but the noise is without a name.
-    noise_width : float
-        Standard deviation of the logarithm of the noise's variance about the known one.
-    asked : int
-        Groups of the discrepancy that might have been there; 0 for those that are listed.
-    whole : Background, optional
-        Of which it is a part.
-    numbers : tuple of int
-        Places of its groups there.
-    """
-
-    groups: tuple[Group, ...]
+    groups: tuple[Group, ...]  # None where nothing but the noise is without a name
+    # standard deviation of the logarithm of the noise's variance about the known one
     noise_width: float
+    # groups of the discrepancy that might have been there; 0 for those that are listed
     asked: int = 0
-    whole: Background | None = None
-    numbers: tuple[int, ...] = ()
+    whole: Background | None = None  # of which it is a part
+    numbers: tuple[int, ...] = ()  # places of its groups there
     _parts: dict[tuple[int, ...], Background] = field(default_factory=dict, repr=False)
 
     def part(self, numbers: Iterable[int]) -> Background:
@@ -159,48 +132,28 @@ class Background:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Where a fit of a set of effects ended, and all slopes there; whitened.
+    """Where a fit of a set of effects ended, and all slopes there; whitened."""
 
-    Parameters
-    ----------
-    left : (N,) float
-        What the fit leaves.
-    columns : (N, p) float
-        Change of that by each unknown.
-    z : (p,) float
-        Unknowns, from the means of their priors and in their standard deviations.
-    weight : (p,) float
-        Weights of the Gaussian priors of set-up and tolerances, nearly 0 where there is none.
-    effects : dict of str to (k,) int
-        Places of the unknowns of each effect.
-    inexact : (N, l) float
-        What the laws of the effects may leave because no law is exact; first those that give.
-    varied : dict of str to (N, l) float
-        What each effect would add if its size changed with the conditions by its own size.
-    gives : tuple of Give
-        In which ways laws give, a column of `inexact` each.
-    linear : bool
-        Whether the slopes hold everywhere: then the unknowns follow the amplitudes.
-    numbers : int
-        Numbers that were measured, where the rows only sum them up; 0 where each is a row.
-    sizing : dict of str to (k,) int
-        Places of those that say how large an effect is, where not all do: these have a size in
-        common, of which little is known; the others lie within their typical magnitudes.
-    possible : dict of str to Possible
-        What the unknowns of each effect can be; anything where it is not told.
-    """
-
-    left: Array
-    columns: Array
-    z: Array
+    left: Array  # (N,), what the fit leaves
+    columns: Array  # (N, p), change of that by each unknown
+    z: Array  # (p,), unknowns, from the means of their priors and in their standard deviations
+    # (p,), weights of the Gaussian priors of set-up and tolerances, nearly 0 where there is none
     weight: Array
-    effects: Mapping[str, NDArray[np.intp]]
+    effects: Mapping[str, NDArray[np.intp]]  # (k,) each, places of the unknowns of each effect
+    # (N, l), what the laws of the effects may leave because no law is exact; first those that give
     inexact: Array
+    # (N, l) each, what each effect would add if its size changed with the conditions by its own
+    # size
     varied: Mapping[str, Array] = field(default_factory=dict)
-    gives: tuple[Give, ...] = ()
+    gives: tuple[Give, ...] = ()  # in which ways laws give, a column of `inexact` each
+    # whether the slopes hold everywhere: then the unknowns follow the amplitudes
     linear: bool = False
+    # numbers that were measured, where the rows only sum them up; 0 where each is a row
     numbers: int = 0
+    # (k,) each, places of those that say how large an effect is, where not all do: these have a
+    # size in common, of which little is known; the others lie within their typical magnitudes
     sizing: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
+    # what the unknowns of each effect can be; anything where it is not told
     possible: Mapping[str, Possible] = field(default_factory=dict)
     _beside: dict[str, Any] = field(default_factory=dict, repr=False)
 
@@ -229,20 +182,10 @@ class Point:
     ) -> Point:
         """Return the point with one effect more, everything followed to first order.
 
-        Parameters
-        ----------
-        name : str
-            Of the effect.
-        left : (N,) float
-            What is left with it, whitened.
-        columns : (N, k) float
-            Change of that by its unknowns.
-        z : (k,) float
-            These.
-        varied : (N, l) float
-            What it would add if its size changed with the conditions by its own size.
-        inexactness : float
-            Share of that by which its law may be wrong.
+        `name`: of the effect; `left` (N,): what is left with it, whitened; `columns` (N, k): change
+        of that by its unknowns; `z` (k,): these; `varied` (N, l): what it would add if its size
+        changed with the conditions by its own size; `inexactness`: share of that by which its law
+        may be wrong.
         """
         places = np.arange(len(self.z), len(self.z) + len(z))
         return replace(
@@ -261,16 +204,8 @@ class Point:
     def products(self, ground: Background, columns: Array) -> Array:
         """Return the products of all columns, those of a background last, with further ones.
 
-        Parameters
-        ----------
-        ground : Background
-            q columns.
-        columns : (N, k) or (N,) float
-            The further ones.
-
-        Returns
-        -------
-        (p + l + q, k) or (p + l + q,) float
+        `ground`: q columns; `columns` (N, k): the further ones.
+        Returns (p + l + q, k) or (p + l + q,).
         """
         own = self.columns.T @ columns, self.inexact.T @ columns
         return np.concatenate([*own, ground.products(columns)])

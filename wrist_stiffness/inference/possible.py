@@ -28,19 +28,13 @@ PRIOR_DRAWS, DRAWS = 100_000, 4_000
 
 @dataclass(frozen=True, eq=False)
 class Possible:
-    """What the unknowns of one effect can be, in the standard deviations of their priors.
+    """What the unknowns of one effect can be, in the standard deviations of their priors."""
 
-    Parameters
-    ----------
-    lower, upper : (k,) float
-        Least and most of each.
-    together : callable, optional
-        (n, k) values within these bounds -> (n,) whether such a set of values can be; any can by
-        default.
-    """
-
+    # (k,), least and most of each
     lower: Array
     upper: Array
+    # (n, k) values within these bounds -> (n,) whether such a set of values can be; any can by
+    # default
     together: Callable[[Array], NDArray[np.bool_]] | None = None
 
     @cached_property
@@ -57,12 +51,7 @@ class Possible:
     def gain(self, z: Array, covariance: Array) -> float:
         """Return what bounds add to the log evidence of an effect.
 
-        Parameters
-        ----------
-        z : (k,) float
-            Most probable values.
-        covariance : (k, k) float
-            Of a normal posterior about them.
+        `z` (k,): most probable values; `covariance` (k, k): of a normal posterior about them.
         """
         sigma = np.sqrt(np.diag(covariance))
         if self.together is None:

@@ -12,12 +12,10 @@ import numpy as np
 
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.inference.candidates import Candidate
-from wrist_stiffness.inference.evidence import OFF
-from wrist_stiffness.inference.linear import LinearFit, Shape
-from wrist_stiffness.inference.nuisance import Nuisance, nuisance_columns
+from wrist_stiffness.inference.candidates import Candidate, Nuisance, nuisance_columns
+from wrist_stiffness.inference.evidence import OFF, Evidence
+from wrist_stiffness.inference.linear import LinearFit, LinearProblem, Shape
 from wrist_stiffness.inference.observations import Array, Observations
-from wrist_stiffness.inference.search import State
 from wrist_stiffness.inference.smooth import Smooth
 
 SCHEMA = 2
@@ -29,27 +27,16 @@ LEAST = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class PredictedSet:
-    """One set of effects with its values, and what it leaves that depends on the conditions.
+    """One set of effects with its values, and what it leaves that depends on the conditions."""
 
-    Parameters
-    ----------
-    probability : float
-        Its share in the predictions.
-    effects : dict of str to ((s,) floats, (k,) floats)
-        Shape and parameters of each effect.
-    nuisances : dict of (str, int or None, int) to float
-        Values by group, session and place in the group.
-    smooth : tuple of (Smooth, (k, m) float)
-        The discrepancy: smooth functions of the conditions with their values.
-    beside : tuple of (str, (s,) floats, (k,) floats)
-        What of these functions candidates could do, by name, shape and parameters: it is no
-        discrepancy, and is taken out again.
-    """
-
-    probability: float
-    effects: Mapping[str, tuple[Shape, Shape]]
+    probability: float  # its share in the predictions
+    effects: Mapping[str, tuple[Shape, Shape]]  # shape (s,) and parameters (k,) of each
+    # values by group, session and place in the group
     nuisances: Mapping[tuple[str, int | None, int], float]
+    # the discrepancy: smooth functions of the conditions with their values, (k, m) each
     smooth: tuple[tuple[Smooth, Array], ...] = ()
+    # what of these functions candidates could do, by name, shape and parameters: it is no
+    # discrepancy, and is taken out again
     beside: tuple[tuple[str, Shape, Shape], ...] = ()
 
 
@@ -100,7 +87,7 @@ class Predictor:
         sets = [
             {
                 "probability": each.probability,
-                "effects": {n: [list(s), list(v)] for n, (s, v) in each.effects.items()},
+                "effects": dict(each.effects),
                 "nuisances": [[*key, value] for key, value in each.nuisances.items()],
                 "smooth": [[q.as_dict(), own.tolist()] for q, own in each.smooth],
                 "beside": each.beside,
@@ -154,20 +141,15 @@ def load_predictor(
     return Predictor(sets, candidates, nuisances)
 
 
-def predicted_set(state: State, probability: float, whole: bool = False) -> PredictedSet:
-    """Return a set of the search at its most probable values.
+def predicted_set(
+    fit: LinearFit, found: Evidence, probability: float, whole: bool = False
+) -> PredictedSet:
+    """Return a fitted set at its most probable values.
 
-    Parameters
-    ----------
-    state : State
-        A set that was fitted.
-    probability : float
-        Its share in the predictions.
-    whole : bool
-        Whether the discrepancy that it leaves is predicted too.
+    `found`: its evidence; `probability`: its share in the predictions; `whole`: whether the
+    discrepancy that it leaves is predicted too.
     """
-    fit: LinearFit = state.fit
-    problem, found = fit.problem, state.evidence
+    problem = fit.problem
     z = (found.point.z + found.step)[: len(fit.z)]
     z = np.where(problem.held(fit), fit.z, z)
     effects = {
@@ -175,10 +157,10 @@ def predicted_set(state: State, probability: float, whole: bool = False) -> Pred
         for name, term in fit.terms.items()
     }
     base = problem.base_sizes * z[: problem.n_nuisances]
-    smooth = _discrepancy(state) if whole else []
+    smooth = _discrepancy(problem, found) if whole else []
     beside = []
     if smooth:
-        conditions = problem.table.observations.covariates
+        conditions = problem.observations.covariates
         change = np.sum([q.features(conditions) @ own for q, own in smooth], axis=0)
         of_base, of_laws = problem.named_share(change)
         base = base - of_base
@@ -188,10 +170,10 @@ def predicted_set(state: State, probability: float, whole: bool = False) -> Pred
     return PredictedSet(probability, effects, nuisances, tuple(smooth), tuple(beside))
 
 
-def _discrepancy(state: State) -> list[tuple[Smooth, Array]]:
+def _discrepancy(problem: LinearProblem, found: Evidence) -> list[tuple[Smooth, Array]]:
     """Return the smooth functions that are there, with their most probable values (k, m)."""
-    found, ground = state.evidence, state.evidence.background
-    asked = {each.name: each for each in state.fit.problem.table.questions}
+    ground = found.background
+    asked = {each.name: each for each in problem.table.questions}
     smooth = []
     for number, group in enumerate(ground.groups):
         if found.amplitude[number] > OFF and group.name in asked:

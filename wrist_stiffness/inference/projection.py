@@ -1,4 +1,6 @@
-"""Orthonormal bases of columns, blind to their scales."""
+"""Few columns for many: orthonormal bases, blind to their scales, and low-rank kernels."""
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -10,20 +12,18 @@ NEGLIGIBLE = 1e-9
 ABSORBED = 1e-5
 """A column of which the base leaves less than this share of the norm lies inside the base."""
 
-
 SQUARED_ROUNDING = 1e-6
 """Singular values below this share of the largest cannot be seen in a Gram matrix."""
+
+LEFT_OUT = 1e-3
+"""Share of a kernel that its columns may leave out."""
 
 
 def orthonormal(columns: Array, original_norm: Array | None = None) -> Array:
     """Orthonormal basis of the columns, (N, r), blind to their scales.
 
-    Parameters
-    ----------
-    columns : (N, k) array
-        Columns, possibly dependent.
-    original_norm : (k,) array, optional
-        Norms before a projection; a column that lost nearly all of it is left out.
+    `columns` (N, k): columns, possibly dependent; `original_norm` (k,): norms before a projection;
+    a column that lost nearly all of it is left out.
     """
     norm = np.linalg.norm(columns, axis=0)
     reference = norm if original_norm is None else original_norm
@@ -41,14 +41,8 @@ def leading_directions(columns: Array, most: int, least: float = SQUARED_ROUNDIN
     directions far below the strongest are lost in rounding, which is no loss where only the strong
     ones are wanted.
 
-    Parameters
-    ----------
-    columns : (N, k) array
-        Columns, possibly dependent.
-    most : int
-        Largest number of directions.
-    least : float, optional
-        Directions whose singular value is below this share of the largest are left out.
+    `columns` (N, k): columns, possibly dependent; `most`: largest number of directions; `least`:
+    directions whose singular value is below this share of the largest are left out.
     """
     norm = np.linalg.norm(columns, axis=0)
     if not (norm > 0).any() or most == 0:
@@ -61,3 +55,23 @@ def leading_directions(columns: Array, most: int, least: float = SQUARED_ROUNDIN
         return np.asarray(vectors[:, strong])
     directions: Array = np.linalg.qr(scaled @ (vectors[:, strong] / np.sqrt(size[strong])))[0]
     return directions
+
+
+def low_rank(
+    kernel: Array, rank: int, left_out: Callable[[Array], float] = np.sum
+) -> tuple[Array, list[int]]:
+    """Return L (u, k) with L L^T nearly a kernel (u, u), k <= rank, by pivoted Cholesky.
+
+    Its units come second, in their order.  It ends where `left_out`, of the variances that are left
+    over, falls to that share of all.
+    """
+    left, columns = np.diag(kernel).astype(float), np.zeros((len(kernel), 0))
+    least = LEFT_OUT * left_out(left)
+    found: list[int] = []
+    while len(found) < rank and left_out(left) > least:
+        at = int(np.argmax(left))
+        column = (kernel[:, at] - columns @ columns[at]) / np.sqrt(left[at])
+        columns = np.column_stack([columns, column])
+        left = np.maximum(left - column**2, 0.0)
+        found.append(at)
+    return columns, found

@@ -14,10 +14,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.amplitudes import ENOUGH, evidence
 from wrist_stiffness.inference.evidence import Array, Evidence
 from wrist_stiffness.inference.giving import GIVES, WAYS
-from wrist_stiffness.inference.point import EXPECTED, Background, Point
+from wrist_stiffness.inference.point import EXPECTED, Background
 from wrist_stiffness.inference.possible import Possible
 
 LEADERS = 6
@@ -40,39 +41,16 @@ MOST_FITS = 48
 Names = frozenset[str]
 
 
-class Fit(Protocol):
-    """A set of effects, fitted whole."""
-
-    @property
-    def names(self) -> Collection[str]:
-        """Effects of the set."""
-
-    @property
-    def point(self) -> Point:
-        """Where it ended."""
-
-
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A candidate about a fitted set.
+    """A candidate about a fitted set."""
 
-    Parameters
-    ----------
-    name : str
-        `effect@component`.
-    smooth : bool
-        Whether its slopes show what it does.
-    blocks : tuple of ((s,) floats, (N, k) array)
-        At points of the grid of what is not linear in it: change of what is left by each unknown,
-        whitened, in standard deviations of the priors.
-    possible : Possible
-        What the unknowns can be.
-    """
-
-    name: str
-    smooth: bool
+    name: str  # `effect@component`
+    smooth: bool  # whether its slopes show what it does
+    # at points (s,) of the grid of what is not linear in it: change (N, k) of what is left by each
+    # unknown, whitened, in standard deviations of the priors
     blocks: tuple[tuple[tuple[float, ...], Array], ...]
-    possible: Possible
+    possible: Possible  # what the unknowns can be
 
     @property
     def law(self) -> str:
@@ -82,27 +60,12 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Ranked:
-    """What a candidate gains to first order, at its best shape.
+    """What a candidate gains to first order, at its best shape."""
 
-    Parameters
-    ----------
-    trial : Trial
-        The candidate.
-    gain : float
-        Of log evidence.
-    log : float
-        That with it.
-    shape : tuple of float
-        Where on its grid.
-    z : (k,) float
-        Its unknowns.
-    """
-
-    trial: Trial
-    gain: float
-    log: float
-    shape: tuple[float, ...]
-    z: Array
+    trial: Trial  # the candidate
+    gain: float  # of log evidence
+    shape: tuple[float, ...]  # where on its grid
+    z: Array  # (k,), its unknowns
 
 
 class Problem(Protocol):
@@ -133,21 +96,11 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A fitted set and how probable it is.
+    """A fitted set and how probable it is."""
 
-    Parameters
-    ----------
-    fit : Fit
-        The set.
-    evidence : Evidence
-        Of it.
-    log : float
-        Log evidence and log prior of the set.
-    """
-
-    fit: Any
-    evidence: Evidence
-    log: float
+    fit: Any  # the set, with the `names` of its effects and the `point` where it ended
+    evidence: Evidence  # of it
+    log: float  # log evidence and log prior of the set
 
     @property
     def names(self) -> Names:
@@ -243,6 +196,18 @@ class Search:
     def best(self) -> State:
         """The most probable set so far."""
         return max(self.states.values(), key=lambda each: each.log)
+
+    def best_with(self, name: str) -> State:
+        """Return the most probable set with an effect.
+
+        Raises `InputError` if no set with it was fitted.
+        """
+        states = [each for each in self.states.values() if name in each.names]
+        if not states:
+            raise InputError(
+                f"{name}: was not fitted; slopes alone told that it explains too little"
+            )
+        return max(states, key=lambda each: each.log)
 
     def _deepened(self, state: State) -> State:
         """Add effects one after the other for as long as that pays."""
@@ -406,11 +371,6 @@ def _one_of_each_law(ranking: Sequence[Ranked], but: Sequence[Ranked]) -> list[R
     return [each for each in laws.values() if each.trial.name not in known]
 
 
-def _of_shape(shape: tuple[float, ...], point: Point) -> float:
-    """Return what a shape costs that was chosen among others (Schwarz 1978)."""
-    return 0.5 * len(shape) * float(np.log(len(point.left)))
-
-
 def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
     """Return what each trial gains at its best shape, largest first."""
     flat = [(each, shape, columns) for each in trials for shape, columns in each.blocks]
@@ -419,7 +379,8 @@ def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
         return []
     gains = at.gains([columns for _, _, columns in flat], [each.possible for each, _, _ in flat])
     for (trial, shape, _), (gain, z) in zip(flat, gains, strict=True):
-        gain -= _of_shape(shape, at.point)
+        # What a shape costs that was chosen among others (Schwarz 1978).
+        gain -= 0.5 * len(shape) * float(np.log(len(at.point.left)))
         if trial.name not in best or best[trial.name].gain < gain:
-            best[trial.name] = Ranked(trial, gain, at.log + gain, shape, z)
+            best[trial.name] = Ranked(trial, gain, shape, z)
     return sorted(best.values(), key=lambda each: -each.gain)

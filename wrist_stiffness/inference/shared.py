@@ -14,12 +14,7 @@ from wrist_stiffness.inference.observations import Array, Labels, Mask, Observat
 def own_covariance(observations: Observations, covariance: Array) -> Array:
     """Return the covariance of each unit without what it shares, (n, m, m).
 
-    Parameters
-    ----------
-    observations : Observations
-        Units.
-    covariance : (m, m) or (n, m, m) array
-        Of each unit by itself.
+    `observations`: units; `covariance` (m, m) or (n, m, m): of each unit by itself.
     """
     n, m = observations.values.shape
     whole = np.broadcast_to(covariance, (n, m, m))
@@ -35,16 +30,11 @@ class Apart:
     The covariance of a stand is that of independent units plus few directions; its inverse root
     differs from theirs in these directions alone.  So it is with what all units have in common.
 
-    Parameters
-    ----------
-    observations : Observations
-        Units.
-    factors : (n, m, m) array
-        Inverse factors of each unit's own covariance.
+    `observations`: units; `factors` (n, m, m): inverse factors of each unit's own covariance.
     """
 
     def __init__(self, observations: Observations, factors: Array) -> None:
-        self._factors = factors
+        self._factors, self._measured = factors, observations.measured
         self._parts: list[tuple[csr_array | Array, Array]] = []
         if observations.shared is not None and observations.stand is not None:
             self._add_stands(observations, observations.shared, observations.stand)
@@ -79,36 +69,53 @@ class Apart:
             flat -= directions @ (shrink * (directions.T @ flat))
         return white
 
+    def rows(self, values: Array) -> Array:
+        """Return (n, m) or (n, m, k) as rows of unit scatter, (n m,) or (n m, k); NaN become 0."""
+        columns = values if values.ndim == 3 else values[:, :, None]
+        white = self(np.where(self._measured[:, :, None], np.nan_to_num(columns), 0.0))
+        flat = white.reshape(self._measured.size, columns.shape[2])
+        return flat if values.ndim == 3 else flat[:, 0]
+
 
 def _shrink(size: Array) -> Array:
     """Return by how much directions shrink in which there is so much scatter more, (k, 1)."""
     return np.asarray(1.0 - 1.0 / np.sqrt(1.0 + size[:, None] ** 2))
 
 
-def stated_covariance(observations: Observations) -> Array:
-    """Return the covariance that a table states of each unit, (n, m, m); zero where none."""
-    n, m = observations.values.shape
-    if observations.covariance is None:
-        return np.zeros((n, m, m))
-    return np.broadcast_to(observations.covariance, (n, m, m))
-
-
 def component_factors(covariance: Array, measured: Mask) -> Array:
     """Inverse Cholesky factors of each unit's covariance over its measured components.
 
-    Parameters
-    ----------
-    covariance : (n, m, m) array
-        Covariance of each unit.
-    measured : (n, m) array of bool
-        Unmeasured components get a unit diagonal and no coupling.
-
-    Returns
-    -------
-    (n, m, m) array
-        L^-1 with L L^T = covariance.
+    `covariance` (n, m, m): covariance of each unit; `measured` (n, m): unmeasured components get a
+    unit diagonal and no coupling.
+    Returns L^-1 (n, m, m) with L L^T = covariance.
     """
     m = covariance.shape[1]
     both = measured[:, :, None] & measured[:, None, :]
     safe = np.where(both, covariance, np.eye(m))
     return np.linalg.inv(np.linalg.cholesky(safe)).astype(np.float64)
+
+
+class Whitened:
+    """Units of a table as rows of unit scatter.
+
+    `observations`: n units of m components; `own` (n, m, m): covariance of each without what it
+    shares; `alike` (n, l): columns of units under like conditions, for which a law errs alike.
+    """
+
+    def __init__(self, observations: Observations, own: Array, alike: Array) -> None:
+        self.observations, self._alike = observations, alike
+        self._apart = Apart(observations, component_factors(own, observations.measured))
+        self._rows = np.flatnonzero(observations.measured.ravel())
+
+    @property
+    def unit(self) -> Labels:
+        """Unit of each row, (N,)."""
+        return self._rows // self.observations.n_components
+
+    def whiten(self, values: Array) -> Array:
+        """Return (n, m) or (n, m, k) as rows of unit scatter, (N,) or (N, k)."""
+        return self._apart.rows(values)[self._rows]
+
+    def varied(self, change: Array) -> Array:
+        """Return what a change (n, m) adds where its size changes with the conditions, (N, l)."""
+        return self.whiten(change[:, :, None] * self._alike[:, None, :])

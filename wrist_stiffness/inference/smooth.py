@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import Any
@@ -11,8 +11,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
-from wrist_stiffness.inference.evidence import Array
-from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.observations import Array, Observations
+from wrist_stiffness.inference.projection import low_rank
 
 LANDMARKS = 400
 """Most different conditions from which the columns of a question are made."""
@@ -32,9 +32,6 @@ WANDER_SHARES, WANDER_RANK = (0.05, 0.3), 24
 """Correlation times of an instrument's drift as shares of a session (assumed), and the columns of
 one component in it."""
 
-LEAST = 1e-3
-"""Share of a kernel that its columns may leave out at the worst of the landmarks."""
-
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
@@ -42,36 +39,18 @@ class Smooth:
 
     The columns are those of a Gaussian process by its values at a few landmarks (Nystroem), chosen
     by a pivoted Cholesky factor; no order of the rows has a part in them.
-
-    Parameters
-    ----------
-    name : str
-        As a person reads it after "depends on".
-    of : tuple of str
-        Conditions.
-    mean, spread : (d,) float
-        Of the conditions in the table that it was made from.
-    lengths : tuple of float
-        Of the kernel, in standard deviations.
-    marks : (k, d) float
-        Landmarks, scaled.
-    factor : (k, k) float
-        Lower factor of the kernel among them.
-    centre : (k,) float
-        Mean of the columns: a constant depends on nothing.
-    size : float
-        Root mean square of a function.
     """
 
-    name: str
-    of: tuple[str, ...]
+    name: str  # as a person reads it after "depends on"
+    of: tuple[str, ...]  # conditions
+    # (d,), of the conditions in the table that it was made from
     mean: Array
     spread: Array
-    lengths: tuple[float, ...]
-    marks: Array
-    factor: Array
-    centre: Array
-    size: float
+    lengths: tuple[float, ...]  # of the kernel, in standard deviations
+    marks: Array  # (k, d), landmarks, scaled
+    factor: Array  # (k, k), lower factor of the kernel among them
+    centre: Array  # (k,), mean of the columns: a constant depends on nothing
+    size: float  # root mean square of a function
 
     def features(self, conditions: Mapping[str, Array]) -> Array:
         """Return the columns for units under any conditions, (u, k)."""
@@ -109,7 +88,8 @@ def smooth(name: str, of: tuple[str, ...], table: Observations, rank: int) -> Sm
         distinct = distinct[np.sort(chosen)]
     several = (float(np.sqrt(len(of))),)
     lengths = LENGTHS if len(of) == 1 else several
-    marks = distinct[_pivots(_kernel(distinct, distinct, lengths), min(rank, table.n_units // 3))]
+    most = max(min(rank, table.n_units // 3), 1)
+    marks = distinct[low_rank(_kernel(distinct, distinct, lengths), most, np.max)[1]]
     whole = _kernel(marks, marks, lengths) + 1e-9 * np.eye(len(marks))
     factor: Array = np.asarray(np.linalg.cholesky(whole), dtype=np.float64)
     zero, one = np.zeros(len(marks)), 1.0
@@ -149,41 +129,32 @@ def alike(table: Observations, rank: int) -> Array:
     return np.column_stack([constant, together.features(table.covariates) / np.sqrt(2.0)])
 
 
-def wander(table: Observations) -> Array:
-    """Return columns (u, k) of a slow drift of unit variance over true time, by session.
-
-    Ornstein-Uhlenbeck of two correlation times, shares of the length of the session.
-    """
+def by_session(table: Observations, columns: Callable[[Array], Array]) -> Array:
+    """Return columns (u, k) over the times of each session by itself, one session after another."""
     parts = [np.zeros((table.n_units, 0))]
     for session in np.unique(table.sessions):
         at = table.sessions == session
-        times = table.times[at]
-        span = float(np.ptp(times)) or 1.0
-        marks = np.linspace(times.min(), times.max(), max(min(WANDER_RANK, at.sum() // 6), 1))
-        near, among = (
-            sum(np.exp(-np.abs(t[:, None] - marks) / (each * span)) for each in WANDER_SHARES)
-            / len(WANDER_SHARES)
-            for t in (times, marks)
-        )
-        factor = np.linalg.cholesky(among + 1e-9 * np.eye(len(marks)))
-        parts.append(np.zeros((table.n_units, len(marks))))
-        parts[-1][at] = solve_triangular(factor, near.T, lower=True).T
+        own = columns(table.times[at])
+        parts.append(np.zeros((table.n_units, own.shape[1])))
+        parts[-1][at] = own
     return np.concatenate(parts, axis=1)
+
+
+def wander(times: Array) -> Array:
+    """Return columns (u, k) of a slow drift of unit variance over the true times of a session.
+
+    Ornstein-Uhlenbeck of two correlation times, shares of the length of the session.
+    """
+    span = float(np.ptp(times)) or 1.0
+    marks = np.linspace(times.min(), times.max(), max(min(WANDER_RANK, len(times) // 6), 1))
+    near, among = (
+        np.mean([np.exp(-np.abs(t[:, None] - marks) / (own * span)) for own in WANDER_SHARES], 0)
+        for t in (times, marks)
+    )
+    factor = np.linalg.cholesky(among + 1e-9 * np.eye(len(marks)))
+    return np.asarray(solve_triangular(factor, near.T, lower=True).T)
 
 
 def _kernel(one: Array, other: Array, lengths: Sequence[float]) -> Array:
     square = cdist(one, other, "sqeuclidean")
     return np.asarray(sum(np.exp(-0.5 * square / each**2) for each in lengths) / len(lengths))
-
-
-def _pivots(kernel: Array, rank: int) -> list[int]:
-    """Return the landmarks of a pivoted Cholesky factor, at most so many and at least one."""
-    left, columns = np.diag(kernel).copy(), np.zeros((len(kernel), 0))
-    found: list[int] = []
-    while len(found) < max(rank, 1) and left.max() > LEAST:
-        at = int(np.argmax(left))
-        column = (kernel[:, at] - columns @ columns[at]) / np.sqrt(left[at])
-        columns = np.column_stack([columns, column])
-        left = np.maximum(left - column**2, 0.0)
-        found.append(at)
-    return found

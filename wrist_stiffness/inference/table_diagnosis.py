@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,14 +21,16 @@ from wrist_stiffness.inference.answer import (
     read,
     standings,
 )
-from wrist_stiffness.inference.candidates import Candidate
+from wrist_stiffness.inference.candidates import Candidate, Nuisance, nuisance_columns
 from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
-from wrist_stiffness.inference.linear import LinearFit, LinearProblem, linear_problem
-from wrist_stiffness.inference.nuisance import Nuisance, nuisance_columns
+from wrist_stiffness.inference.linear import LinearFit, LinearProblem
+from wrist_stiffness.inference.noise import in_each_component
 from wrist_stiffness.inference.observations import Array, Mask, Observations
-from wrist_stiffness.inference.plain_table import Table, lost
+from wrist_stiffness.inference.outliers import FEWEST_UNITS, OUTLIER_LIMIT, lost_units
+from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.predictor import LEAST, PredictedSet, Predictor, predicted_set
 from wrist_stiffness.inference.search import Search, State
+from wrist_stiffness.inference.smooth import questions
 
 HELD_OUT = 5
 """One unit of so many judges where there is one session only."""
@@ -64,12 +66,7 @@ class TableDiagnosis(Diagnosis):
         InputError
             If no set with it was fitted.
         """
-        states = [each for each in self.search.states.values() if name in each.names]
-        if not states:
-            raise InputError(
-                f"{name}: was not fitted; slopes alone told that it explains too little"
-            )
-        change: Array = max(states, key=lambda each: each.log).fit.change(name)
+        change: Array = self.search.best_with(name).fit.change(name)
         return change
 
 
@@ -120,25 +117,26 @@ def diagnose(
     _refuse(observations, candidates, nuisances)
     observations = replace(observations, row=None)
     base = nuisance_columns(observations, tuple(nuisances)).columns
-    away = lost(observations, base, candidates)
+    away = _lost(observations, base, candidates)
     whole = observations.take(~away)
-    aside = _another_session(whole)
+    names = np.unique(whole.sessions)
+    aside = np.asarray((whole.sessions == names[-1]) & (len(names) > 1))
     seen = whole.take(~aside) if aside.any() else whole
     tell("looking at the table")
-    problem = linear_problem(seen, candidates, nuisances, ordered)
+    problem = LinearProblem(seen, candidates, nuisances, ordered)
     search = Search(problem, seconds, tell, MOST_EFFECTS, costly=False)
     search.run()
     reading = read(search, naming)
     tell("judging by what was held out")
     judge = _Judge(problem, whole, aside, nuisances, _noise(reading.state, problem.table))
-    before, after = judge.left(search.base), judge.left(reading.state)
+    before, after = judge.left(search.base.fit), judge.left(reading.state.fit)
     refused = bool(reading.named) and refuted(before, after)
     if refused:
         after = before
         reading = reading.refute(search.base)
     suspects = [each for each in reading.classes if each not in reading.named]
     table = problem.table
-    answer = Diagnosis(
+    return TableDiagnosis(
         reading.verdict,
         reading.probability,
         seen.rms(_noise(reading.state, table)),
@@ -146,19 +144,16 @@ def diagnose(
         {q.key: before.rmse(q) for q in seen.reported},
         {q.key: after.rmse(q) for q in seen.reported},
         tuple(
-            _finding(search, each, reading.state, _buys(judge, reading.state, each, after))
+            _finding(each, reading.state, judge.left(reading.state.fit, each.name), after)
             for each in reading.named
         ),
-        tuple(_finding(search, each, search.best, {}) for each in suspects),
+        tuple(_finding(each, search.best) for each in suspects),
         reading.depends_on,
         reading.unexplained,
         standings(search, reading),
         _not_excited(problem, search),
         scope="another session" if aside.any() else "a part of this session",
         complete=search.in_time,
-    )
-    return TableDiagnosis(
-        **{each.name: getattr(answer, each.name) for each in fields(answer)},
         predictor=Predictor(_sets(search, refused), candidates, nuisances),
         search=search,
         lost=tuple(np.flatnonzero(away).tolist()),
@@ -178,10 +173,14 @@ def _refuse(
         raise InputError("a table of one row: at least two are needed, one of them judges")
 
 
-def _another_session(whole: Observations) -> Mask:
-    """Return which units belong to the last of several sessions, (n,)."""
-    names = np.unique(whole.sessions)
-    return np.asarray((whole.sessions == names[-1]) & (len(names) > 1))
+def _lost(observations: Observations, base: Array, candidates: Sequence[Candidate]) -> Mask:
+    """Return which units lie far from everything together, (n,)."""
+    if observations.n_units < FEWEST_UNITS:
+        return np.zeros(observations.n_units, dtype=bool)
+    smooth = [each.features(observations.covariates) for each in questions(observations)]
+    columns = [base, in_each_component(smooth, observations)]
+    columns += [each.evaluate(observations, s) for each in candidates for s in each.shapes]
+    return lost_units(observations, np.concatenate(columns, axis=2), OUTLIER_LIMIT)
 
 
 def _spread(whole: Observations) -> Mask:
@@ -205,40 +204,35 @@ class _Judge:
     ) -> None:
         self._problem, self._nuisances = problem, nuisances
         self._size = np.sqrt(variance)
-        self._alone = not aside.any()
-        if self._alone:
-            aside = _spread(whole)
-            candidates, ordered = problem.candidates, problem.table.ordered
-            self._problem = linear_problem(whole.take(~aside), candidates, nuisances, ordered)
+        alone = not aside.any()
+        if alone:
+            aside, laws = _spread(whole), list(problem.laws.values())
+            self._problem = LinearProblem(
+                whole.take(~aside), laws, nuisances, problem.table.ordered
+            )
         self._unseen = whole.take(aside)
         free = nuisance_columns(self._unseen, tuple(nuisances))
-        new = [session is not None and not self._alone for _, session, _ in free.keys]
+        new = [session is not None and not alone for _, session, _ in free.keys]
         self._set_up = free.columns[:, :, new]
         self._prior = free.prior_std[new]
 
-    def left(self, state: State) -> HeldOut:
-        """Return what a set leaves of the unseen units, set up anew in another session."""
-        problem = self._problem
-        fit = problem.fitted(state.fit.terms)
-        found = evidence(fit.point, problem.background)
-        own = State(fit, found, found.log)
-        values = predicted_set(own, 1.0)
-        unseen = self._unseen
-        change = Predictor((values,), problem.candidates, self._nuisances).predict(unseen)
-        residual = unseen.values - change
+    def left(self, found: LinearFit, without: str = "") -> HeldOut:
+        """Return what a set, or that without an effect, leaves of the unseen units.
+
+        Set up anew in another session.
+        """
+        problem, unseen = self._problem, self._unseen
+        fit = problem.without(found, without)
+        values = predicted_set(fit, evidence(fit.point, problem.background), 1.0)
+        laws = list(problem.laws.values())
+        residual = unseen.values - Predictor((values,), laws, self._nuisances).predict(unseen)
         columns = self._set_up / self._size[:, None]
         rows = unseen.measured.ravel()
         flat = columns.reshape(len(rows), -1)[rows]
         target = (residual / self._size).ravel()[rows]
         gram = flat.T @ flat + np.diag(1.0 / self._prior**2)
-        values_of = np.linalg.lstsq(gram, flat.T @ target, rcond=1e-12)[0]
-        residual = residual - self._set_up @ values_of
-        return HeldOut(residual, target - flat @ values_of)
-
-    def without(self, state: State, name: str) -> HeldOut:
-        """Return what is left without one of the effects."""
-        fit = self._problem.without(state.fit, name)
-        return self.left(State(fit, state.evidence, state.log))
+        set_up = np.linalg.lstsq(gram, flat.T @ target, rcond=1e-12)[0]
+        return HeldOut(residual - self._set_up @ set_up, target - flat @ set_up)
 
 
 def _noise(state: State, table: Table) -> Array:
@@ -253,21 +247,15 @@ def _discrepancy(state: State, table: Table) -> Array:
     return table.variance * share
 
 
-def _buys(
-    judge: _Judge, state: State, found: Class, after: HeldOut
-) -> dict[str, tuple[float, float]]:
-    """Return by how much the held-out error falls by an effect of a set."""
-    before = judge.without(state, found.name)
-    quantities = state.fit.problem.table.observations.reported
-    return {quantity.key: bought(before, after, quantity) for quantity in quantities}
-
-
 def _finding(
-    search: Search, found: Class, state: State, buys: dict[str, tuple[float, float]]
+    found: Class, state: State, before: HeldOut | None = None, after: HeldOut | None = None
 ) -> Finding:
+    """Return an effect of a set; what it buys, where the held-out error without it is known."""
     fit: LinearFit = state.fit
-    candidate = fit.terms[found.name].candidate
-    known = {each.name: each for each in fit.problem.candidates}
+    candidate, known = fit.terms[found.name].candidate, fit.problem.laws
+    buys = {}
+    if before is not None and after is not None:
+        buys = {q.key: bought(before, after, q) for q in fit.problem.observations.reported}
     explained = 1.0 - found.left
     return Finding(
         tuple((known[n].effect, known[n].component, share) for n, share in found.members.items()),
@@ -285,7 +273,7 @@ def _finding(
 def _values(state: State, name: str) -> dict[str, tuple[float, float]]:
     """Return parameters and shapes of an effect with their standard uncertainties."""
     fit: LinearFit = state.fit
-    _, values = predicted_set(state, 1.0).effects[name]
+    _, values = predicted_set(fit, state.evidence, 1.0).effects[name]
     term, sizes = fit.terms[name], fit.problem.sizes[name]
     sigma = np.sqrt(np.diag(state.evidence.covariance))
     own = sigma[fit.places[name]] * sizes
@@ -305,7 +293,7 @@ def _values(state: State, name: str) -> dict[str, tuple[float, float]]:
 
 def _not_excited(problem: LinearProblem, search: Search) -> tuple[NotExcited, ...]:
     """Return the candidates of which a plausible size would not show."""
-    laws = {each.name: each for each in problem.candidates}
+    laws = problem.laws
     return tuple(
         NotExcited(laws[name].effect, laws[name].component, laws[name].needs)
         for name in not_shown(search)
@@ -314,11 +302,12 @@ def _not_excited(problem: LinearProblem, search: Search) -> tuple[NotExcited, ..
 
 def _sets(search: Search, refused: bool) -> tuple[PredictedSet, ...]:
     """Return the sets that predict, with their probabilities."""
-    if refused:
-        return (predicted_set(search.base, 1.0, whole=True),)
     known = probabilities(search)
-    weights = {n: known[n] for n in search.states if known[n] >= LEAST}
-    if not weights:
-        return (predicted_set(search.best, 1.0, whole=True),)
-    total = sum(weights.values())
-    return tuple(predicted_set(search.states[n], w / total, True) for n, w in weights.items())
+    weights = {n: known[n] for n in search.states if known[n] >= LEAST} or {search.best.names: 1.0}
+    if refused:
+        weights = {search.base.names: 1.0}
+    total, sets = sum(weights.values()), []
+    for names, weight in weights.items():
+        state = search.states[names]
+        sets.append(predicted_set(state.fit, state.evidence, weight / total, whole=True))
+    return tuple(sets)

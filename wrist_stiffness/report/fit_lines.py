@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
-from wrist_stiffness.identification.result import Fit, FittedParameter
+from wrist_stiffness.identification.result import FittedParameter
+from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.report.page import TITLES, Table, plus_minus
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
@@ -81,7 +82,7 @@ def extension_lines(found: Extended) -> list[str]:
 
 def _judged_lines(
     sessions: Sequence[MeasuredSession],
-    fit: Fit,
+    fit: WristFit,
     judged_by: str,
     rows: Mapping[str, Mapping[str, float]],
 ) -> list[str]:
@@ -103,7 +104,7 @@ def _judged_lines(
     return [*used_lines(sessions, fit), "", *table.lines(), judged, left]
 
 
-def used_lines(sessions: Sequence[MeasuredSession], found: Fit) -> list[str]:
+def used_lines(sessions: Sequence[MeasuredSession], found: WristFit) -> list[str]:
     """Tell what the fit saw, and what of the recordings could not be used."""
     table = found.problem.table
     dwells = sum(int((each.cut.dwell & each.measured).sum()) for each in found.problem.sessions)
@@ -137,7 +138,7 @@ def told_lines(
     return lines
 
 
-def untold_lines(found: Fit, parameters: Iterable[FittedParameter]) -> list[str]:
+def untold_lines(found: WristFit, parameters: Iterable[FittedParameter]) -> list[str]:
     """Tell what the data do not say, by what to record to see it."""
     needs = {each.effect.name: each.effect.law.excited_by for each in found.problem.free}
     # Several sessions may say the same of one parameter.
