@@ -110,7 +110,7 @@ def main() -> None:
         "pose error to bytes": lambda i: error_payload(i, predictions[i].twist, covariance),
         "pose of the twist": lambda i: pose_of_twist(predictions[i].twist),
         "general operators, response": lambda i: respond(
-            table.operators_at(configurations[i]), load.wrench, guess(i)
+            table.operators_at(configurations[i]), load.wrench
         ),
     }
     print(f"smallest matrix product {microseconds(lambda i: jacobian.T.dot(jacobian)):14.2f} us")

@@ -304,8 +304,8 @@ def learned(nominal: Robot, folder: Path) -> float:
         began = time.process_time()
         result = diagnose(seen, catalogue(robot), base(robot))
         tell(robot, result, time.process_time() - began)
-        nominal = result.search.base
-        known = predicted_set(nominal.fit, nominal.evidence, 1.0)
+        bare = result.search.base
+        known = predicted_set(bare.fit, bare.evidence, 1.0)
         nothing = Predictor((known,), (), base(robot))
         alone, error = (
             mean_error_mm(unseen.values - each.predict(unseen))

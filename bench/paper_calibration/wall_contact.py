@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 from paper_page import insert_blocks
-from wall_models import scaled
 
+from wrist_stiffness.fem.components import SHIPPED_SIZES
 from wrist_stiffness.fem.elasticity import rigid_motion
 from wrist_stiffness.fem.factor import factorise
 from wrist_stiffness.fem.one_sided import patch_bushing
@@ -49,8 +49,8 @@ def main() -> None:
     arguments = parser.parse_args()
     parts = wrist_parts(load_geometry("config/palmieri2015.yaml"))
     solid = next(part.solid for part in parts if part.name == JOINT)
-    arc = FINER_AROUND * asdict(scaled(1.0))["bushing_arc"]
-    body = assemble_body(solid, replace(scaled(3.0), bushing_arc=arc))
+    arc = FINER_AROUND * asdict(SHIPPED_SIZES)["bushing_arc"]
+    body = assemble_body(solid, replace(SHIPPED_SIZES.times(3.0), bushing_arc=arc))
     bushing = patch_bushing(body, RINGS)
     wall = bushing.surface == "wall"
     patches = bushing.flexibility[np.ix_(wall, wall)], bushing.wrench[:, wall]
