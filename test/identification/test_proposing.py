@@ -222,8 +222,8 @@ def test_a_law_beside_something_that_follows_none_is_told_as_less_sure(model, da
     """What a law leaves above the noise may as well be what is missing itself."""
     lift = model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * clamp_bar"
     text = "wild_um * sin(23 * theta_1) * sin(19 * theta_2)"
-    wild = FormulaLaw("wild", "frame", np.eye(6)[2], text, (), ("wild_um",))
-    beside = effect_at(wild, "frame", {"wild_um": 6.0})
+    wild = FormulaLaw("wild", "frame", np.eye(6)[0], text, (), ("wild_um",))
+    beside = effect_at(wild, "frame", {"wild_um": 3.0})
     sure, unsure = (
         proposed(model, planted(*lift, *others, lift_um=2.0)).terms[0] for others in ((), (beside,))
     )
