@@ -77,7 +77,9 @@ def test_a_drive_that_is_softer_one_way_is_named_and_its_law_gives(model, in_the
     if form == "linear":
         assert finding.gives == {}
         return
-    _, (soft, stiff) = build(hidden, model.table).wound(None, np.array([1.0, -1.0]))
+    about = np.concatenate([np.zeros(3), model.table.geometry.axes["joint_1"]])
+    _, slopes = build(hidden, model.table).bend(None, np.outer([1.0, -1.0], about))
+    soft, stiff = about @ slopes @ about
     value, error = finding.gives["asymmetry"]
     assert abs(abs(value) - abs(soft - stiff) / (soft + stiff)) < 3.0 * error < 0.1
     assert "growth" not in finding.gives

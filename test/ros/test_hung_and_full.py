@@ -12,7 +12,7 @@ import pytest
 from std_msgs.msg import Float64MultiArray
 
 from wrist_stiffness.cli import main as command_line
-from wrist_stiffness.cli import progress
+from wrist_stiffness.cli import simulate
 from wrist_stiffness.commands import cell
 from wrist_stiffness.commands.node_list import RECORDER_NODE
 from wrist_stiffness.errors import InputError
@@ -49,7 +49,7 @@ def test_a_node_that_hangs_is_named_and_the_recording_is_kept(tmp_path, monkeypa
             stopped.append(node_of_this_process("pose_error_predictor"))
             os.kill(stopped[0], signal.SIGSTOP)
 
-    monkeypatch.setattr(progress, "Progress", lambda label: stop)
+    monkeypatch.setattr(simulate, "Progress", lambda label: stop)
     seconds = ["--seconds", "4", "--rate", "50"]
     assert command_line.main(["cell", *seconds, "--record", str(path)]) == 1
     out, errors = capfd.readouterr()
