@@ -113,7 +113,7 @@ def _sections(result: Diagnosis) -> dict[str, list[Part]]:
         ("left above the noise", result.discrepancy),
     )
     table = Table(
-        f"RMS; of the first two on the held-out part, which was {result.scope}.",
+        f"RMS. The first two rows are of held-out data: {result.scope}.",
         ["", *(TITLES[key] for key in result.before)],
         [[name, *(number(row[key]) for key in result.before)] for name, row in rows],
     )
