@@ -18,7 +18,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.sessions.gauges import Gauge
+from wrist_stiffness.sessions.gauges import Gauge, Gauges
 from wrist_stiffness.sessions.observing import observe, without_mounting
 from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.simulation.catalogue import HiddenEffect
@@ -83,6 +83,25 @@ def imported(folder, block, readings, header="a_um,b_um,c_um,d_um,e_um,level_mde
     described = GAUGES_YAML.splitlines(keepends=True)
     gauges.write_text("".join(described[: 2 + readings.shape[1]]))
     return import_csv(table, folder / "bag.mcap", gauges_file=gauges).recording
+
+
+def test_twists_and_mountings_change_readings_as_levers_and_arrows_say(table):
+    """A dial shows the way of its ball, a level the turn about the axis across arrow and plumb."""
+    theta, gauges = conditions(7).theta, Gauges(GAUGES, table.mechanism, UP)
+    turned = table.mechanism.platform_rotation(theta)
+    rows, mountings = gauges.rows(theta), gauges.common(theta)
+    for number, each in enumerate(GAUGES[:-1]):
+        lever = np.cross(turned @ each.point, each.direction)
+        way = np.broadcast_to(each.direction, lever.shape)
+        assert rows[:, number] == pytest.approx(np.hstack([way, lever]), abs=1e-7)
+        own = mountings[:, number, 6 * number : 6 * number + 4]
+        assert own[:, 0] == pytest.approx(0.02)
+        ball = 1e-3 * np.einsum("nij,i->nj", turned, each.direction)
+        assert own[:, 1:] == pytest.approx(ball, abs=1e-9)
+    arrow = turned @ GAUGES[-1].direction
+    across = np.cross(arrow, UP) / np.linalg.norm(np.cross(arrow, UP), axis=1, keepdims=True)
+    assert rows[:, -1] == pytest.approx(np.hstack([0.0 * across, across]), abs=1e-7)
+    assert mountings[:, -1, 30] == pytest.approx(0.1)
 
 
 def test_a_gauge_is_the_projected_pose_of_a_tracker(tmp_path, model, table):
