@@ -171,6 +171,7 @@ def test_unknown_tells_on_what_it_depends(observations):
     left = {"s_um": 3.0, "phi_mdeg": 9.0}
     rest = replace(RESULT, findings=(), depends_on={"humidity": 0.7, "the speed": 0.3})
     page = page_of(replace(rest, verdict="unknown", discrepancy=left), observations)
+    assert page.index("What remains") < page.index("How much it brings")
     assert "no effect in the catalogue explains it" in page
     assert "It depends on humidity (70 %), the speed (30 %)." in page
     assert "Left above the noise: s 3 µm, phi 9 mdeg." in page

@@ -83,19 +83,22 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
     absorbed: list[Part] = [Bullets(result.absorbed)]
     if found.remarks:
         absorbed += ["To be kept in mind:", Bullets(found.remarks)]
+    whole: Sections = {
+        **sections,
+        "Where it shows": _depends(found, left),
+        "What remains": remains,
+        "Absorbed by calibration": absorbed,
+        "How it was computed": [Bullets(HOW)],
+        **provenance_section(found.provenance),
+    }
+    # Where nothing of the catalogue fits, what does comes first.
+    first: Sections = {} if result.findings else {"What remains": remains}
     return Page(
         "Which physical effect is missing?",
         f"{', '.join(found.recordings)}: {left.observations.n_units} dwells and half seconds in "
         "motion",
         verdict,
-        {
-            **sections,
-            "Where it shows": _depends(found, left),
-            "What remains": remains,
-            "Absorbed by calibration": absorbed,
-            "How it was computed": [Bullets(HOW)],
-            **provenance_section(found.provenance),
-        },
+        {**first, **whole},
     )
 
 
