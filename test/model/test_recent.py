@@ -54,6 +54,34 @@ def test_a_model_with_another_effect_or_one_more_is_another_one(model, make, eva
     assert not alike(found[2], found[1])
 
 
+class Heavier(Law):
+    """A platform of twice the weight."""
+
+    id = "heavier"
+    stage = "parts"
+    places = ("platform",)
+    sentence = check = excited_by = ""
+
+    def parameters(self, place):
+        return ()
+
+    def changed(self, parts, place, values):
+        return replace(parts, platform_weight=2.0 * parts.platform_weight)
+
+
+def test_another_model_takes_over_what_neither_springs_nor_weights_change(model, make, evaluated):
+    """To the bit, and beyond the chunks that are kept."""
+    block, recent = make.block((MOST_KEPT + 2) * CHUNK), Recent()
+    soft = make.effect("link_stiffness@link_1", flexibility_percent=50.0)
+    rubbing = make.effect("joint_friction@joint_3", coefficient=0.2, bristle_um_per_N=0.5)
+    found = []
+    for effects in ((), (soft, rubbing), (Effect(Heavier(), "platform"),), (soft,)):
+        found += model.batch_with(block, [effects], recent=recent)
+        (alone,) = model.batch_with(block, [effects])
+        np.testing.assert_array_equal(found[-1].measured, alone.measured)
+    assert not any(alike(one, other) for one, other in zip(found, found[1:], strict=False))
+
+
 @pytest.mark.parametrize("changed", ["evaluation", "table"])
 def test_the_same_effects_on_another_table_are_another_model(model, make, evaluated, changed):
     block, recent = make.block(CHUNK), Recent()

@@ -216,17 +216,30 @@ class _Search:
         return _distinct(self._settled(sorted(found, key=_log, reverse=True), fit))
 
     def _settled(self, found: list[_Judged], near: WristFit) -> list[_Judged]:
-        """Return laws, the most probable first, fitted where that may change which it is."""
-        best, reach = near.evidence.log, 0.0
-        for number, first in enumerate(found):
-            # Fits reach further than their first order, some more than others.
-            if first.log + UNLIKE * reach < best - NEGLIGIBLE:
-                break
-            while (again := self._fitted(found[number], near)).log > found[number].log + NEGLIGIBLE:
-                found[number] = again
-            reach = max(reach, found[number].log - first.log)
-            best = max(best, found[number].log)
-        return sorted(found, key=_log, reverse=True)
+        """Return laws, the most probable first, fitted where that may change which it is.
+
+        Fits reach further than their first order, and the next one the less far the less the last
+        one gained; of a law that was not fitted yet, the first fits of others tell.
+        """
+        found, last, usual = list(found), dict[int, float](), 0.0
+        while True:
+            best = max([near.evidence.log, *map(_log, found)])
+            further = {
+                n: UNLIKE * last.get(n, usual if last else np.inf) for n in range(len(found))
+            }
+            worth = [
+                n
+                for n, more in further.items()
+                if more > NEGLIGIBLE and found[n].log + more > best - NEGLIGIBLE
+            ]
+            if not worth:
+                return sorted(found, key=_log, reverse=True)
+            n = max(worth, key=lambda n: found[n].log + further[n])
+            again = self._fitted(found[n], near)
+            gain = again.log - found[n].log
+            if n not in last:
+                usual = max(usual, gain)
+            found[n], last[n] = again, gain
 
     def _fitted(self, first: _Judged, near: WristFit) -> _Judged:
         """Return a law judged where a fit ends with it, if that is more probable.

@@ -23,6 +23,7 @@ from wrist_stiffness.model.evaluation import (
 )
 from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.prediction import BlockPrediction
+from wrist_stiffness.model.situation import BlockStatics
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -38,33 +39,50 @@ MOST_KEPT = 4
 
 
 class Recent:
-    """What the first of the last models did at a block: the next ones often begin with it again."""
+    """What the first of the last models did at a block, and what it rests on.
+
+    The next ones often begin with it again.
+    """
 
     def __init__(self) -> None:
         self._model: ErrorModel | None = None
         self._chunks: list[Evaluated] = []
+        self._statics: list[BlockStatics] = []
 
     def like(self, model: ErrorModel) -> ErrorModel:
         """Return the known model if it is the same as one; else this one, from now on known."""
-        if self._model is None or not _same(self._model, model):
-            self._model, self._chunks = model, []
-        return self._model
+        known = self._model
+        if known is not None and _same(known, model):
+            return known
+        alike = known is not None and _alike(known, model)
+        begun = [each.situations[0].statics for each in self._chunks if alike]
+        self._statics = [each.without_operators(each.parts) for each in begun]
+        self._model, self._chunks = model, []
+        return model
 
-    def chunk(self, number: int, evaluated: Callable[[], Evaluated]) -> Evaluated:
-        """Return what the known model did at a chunk, evaluated now if need be."""
+    def chunk(self, number: int, evaluated: Callable[..., Evaluated]) -> Evaluated:
+        """Return what the known model did at a chunk, evaluated now if need be.
+
+        `evaluated` takes the `statics` of the chunk with which an earlier model began, if any.
+        """
         if number < len(self._chunks):
             return self._chunks[number]
-        found = evaluated()
+        known = self._statics[number : number + 1]
+        found = evaluated(statics=known[0] if known else None)
         if number < MOST_KEPT:
             self._chunks.append(found)
         return found
 
 
+def _alike(one: ErrorModel, other: ErrorModel) -> bool:
+    """Tell whether two models rest on the same table."""
+    return one.table is other.table and one.evaluation == other.evaluation
+
+
 def _same(one: ErrorModel, other: ErrorModel) -> bool:
     """Tell whether two models have the very same effects on the same table."""
     return (
-        one.table is other.table
-        and one.evaluation == other.evaluation
+        _alike(one, other)
         and len(one.effects) == len(other.effects)
         # A user's own law may write into its state: what it did cannot be begun from again.
         and all(

@@ -146,17 +146,22 @@ def evaluate(
     memory: Memory | None,
     pose: Configuration | None = None,
     near: Guesses = NO_GUESSES,
+    statics: BlockStatics | None = None,
 ) -> Evaluated:
     """Evaluate a model over a block.
 
     `block`: n > 0 samples inside the table's domain and load range; `memory`: what the block before
     left, None at the start; `pose`: the configuration of a block of one sample, where it is known;
-    `near`: where effects whose states are guesses ended at this block before, by their names.
+    `near`: where effects whose states are guesses ended at this block before, by their names;
+    `statics`: of this block, where another model of the same table was evaluated.
     """
+    guess = None if memory is None else memory.active
+    if statics is not None:
+        start = Situation(statics.with_parts(model.parts), model.constants, guess=guess)
+        return _staged(model, start, memory, None, near)
     if block.theta_dot is None:
         before = None if memory is None else (memory.time, memory.theta)
         block = replace(block, theta_dot=slope(block.time, block.theta, before)[0])
-    guess = None if memory is None else memory.active
     return _staged(model, situation_of(model, block, guess, pose), memory, None, near)
 
 

@@ -53,26 +53,32 @@ class BlockStatics:
 
     def with_parts(self, parts: ElasticComponents) -> BlockStatics:
         """Return the statics of the same samples with other parts."""
+        other, known = self.without_operators(parts), vars(self)
+        if (
+            "operators" in known
+            and "own_weight" in vars(other)
+            and self.evaluation == "closed_form"
+            and parts.contact.keys() == self.parts.contact.keys()
+        ):
+            vars(other)["operators"] = changed_operators(
+                self.operators,
+                self.configuration,
+                self.parts,
+                parts,
+                self.table.geometry.gravity,
+                self.own_weight,
+            )
+        return other
+
+    def without_operators(self, parts: ElasticComponents) -> BlockStatics:
+        """Return the same, but for what takes much memory and rests on all parts."""
         other = replace(self, parts=parts)
-        for name in ("influence", "jacobian"):
-            if name in self.__dict__:
-                other.__dict__[name] = self.__dict__[name]
-        same = ("weight_motor_side", "weight_platform_side", "platform_weight")
-        if all(getattr(parts, name) is getattr(self.parts, name) for name in same):
+        shared = ["influence", "jacobian"]
+        weights = ("weight_motor_side", "weight_platform_side", "platform_weight")
+        if all(getattr(parts, name) is getattr(self.parts, name) for name in weights):
             # The free slides make the wrist isostatic: own weight finds its way without springs.
-            other.__dict__["own_weight"] = self.own_weight
-            if (
-                self.evaluation == "closed_form"
-                and parts.contact.keys() == self.parts.contact.keys()
-            ):
-                other.__dict__["operators"] = changed_operators(
-                    self.operators,
-                    self.configuration,
-                    self.parts,
-                    parts,
-                    self.table.geometry.gravity,
-                    self.own_weight,
-                )
+            shared.append("own_weight")
+        vars(other).update({name: vars(self)[name] for name in shared if name in vars(self)})
         return other
 
     @cached_property
