@@ -187,3 +187,33 @@ def test_of_walls_slopes_tell_nothing_so_the_law_that_leads_is_asked_everywhere(
     search = Search(Walled(rng), most_effects=1)
     search.run()
     assert search.best.names == {"play@true"}
+
+
+def test_in_place_of_an_effect_only_what_may_regain_half_of_it_is_asked(rng):
+    """All slopes promise something; of the rest only one shows as much as what was dropped."""
+    first, second = rng.normal(size=(2, ROWS))
+
+    class Two(Disappointing):
+        def __init__(self, rng):
+            super().__init__(rng, 1.0)
+            self.left = 6.0 * first + 5.0 * second + rng.normal(size=ROWS)
+            shares = {"cause@first": (1.0, 0.0), "cause@second": (0.0, 1.0)}
+            shares |= {"rival@place": (0.99, 0.0)}
+            shares |= {f"weak_{number}@place": (0.4, 0.0) for number in range(3)}
+            for name, (one, two) in shares.items():
+                noise = np.sqrt(1.0 - one**2 - two**2) * rng.normal(size=ROWS)
+                self.slopes[name] = (one * first + two * second + noise)[:, None]
+            self.whole = self.slopes = {name: self.slopes[name] for name in shares}
+            self.asked = set()
+
+        def nearly(self, fit, ranked):
+            self.asked.add((frozenset(fit.names), ranked.trial.name))
+            return self.fitted((*fit.names, ranked.trial.name))
+
+    problem = Two(rng)
+    search = Search(problem, most_effects=2)
+    search.run()
+    assert search.best.names == {"cause@first", "cause@second"}
+    assert "weak_0@place" in {name for names, name in problem.asked if not names}
+    beside_second = {n for names, n in problem.asked if names == {"cause@second"}}
+    assert beside_second == {"rival@place"}

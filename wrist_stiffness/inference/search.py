@@ -32,6 +32,10 @@ MOST_EFFECTS = 3
 catalogue, the largest takes an nth of the error, or brings an nth of the log evidence that is to be
 had; where the best candidate does neither, the search does not go on beside it."""
 
+SHARE = 0.5
+"""Of the log evidence that is lost with an effect, what another one must promise to regain in its
+place to be asked (assumed; `bench/hidden_effects/fresh.py` finds the same names as without)."""
+
 PRICE_OF_GIVING = float(np.log(len(WAYS) / GIVES))
 """Log prior odds against a law that gives in one way."""
 
@@ -155,6 +159,7 @@ class Search:
         self.strength: dict[str, float] = {}
         self.in_time = True
         self._asked: dict[Names, tuple[float, dict[str, float]]] = {}
+        self._gained: dict[str, float] = {}
         self._fits = 0
         self._catalogue = 0
         tell("fitting the nominal model with its tolerances")
@@ -167,7 +172,7 @@ class Search:
             for name in sorted(best.names):
                 less = self._less(best, name)
                 if self._may_lead_further(less, best):
-                    self._grown(less, best.names)
+                    self._grown(less, best)
             before = best.log
             if self.best.log > before:
                 best = self._deepened(self.best)
@@ -230,21 +235,29 @@ class Search:
                 break
         return self.best
 
-    def _grown(self, state: State, not_again: Collection[str] = ()) -> list[State]:
-        """Return the sets with one effect more that were worth a fit."""
+    def _grown(self, state: State, instead_of: State | None = None) -> list[State]:
+        """Return the sets with one effect more that were worth a fit.
+
+        `instead_of`: the set of which one effect was dropped.
+        """
         self._tell(f"asking every candidate{_beside(state.names)}")
-        trials = [each for each in self._problem.trials(state.fit) if each.name not in not_again]
+        trials = self._problem.trials(state.fit)
         self._catalogue = max(self._catalogue, len(trials) + len(state.names))
         as_noise = ranked(state.evidence.without_discrepancy(), trials)
         beyond = ranked(state.evidence, trials)
         if not state.names:
             self._promise(state, trials, (*beyond, *as_noise))
-        leaders = self._leaders(as_noise, beyond)
-        others = _one_of_each_law(as_noise, leaders) if state.rough else []
         found: list[State] = []
         logs: dict[str, float] = {}
         self._asked[state.names] = state.evidence.log, logs
-        best = state.evidence.log + self.price
+        least = 0.0
+        if instead_of is not None:
+            least = SHARE * (instead_of.evidence.log - state.evidence.log)
+            as_noise = self._in_place(state, instead_of, as_noise)
+            beyond = self._in_place(state, instead_of, beyond)
+        leaders = self._leaders(as_noise, beyond)
+        others = _one_of_each_law(as_noise, leaders) if state.rough else []
+        best = state.evidence.log + max(self.price, least + NEGLIGIBLE)
         reach: dict[str, float] = {}
 
         def ask(candidates: Sequence[Ranked]) -> None:
@@ -270,6 +283,9 @@ class Search:
                     continue
                 found.append(self._known(fit, state))
                 logs[name] = found[-1].evidence.log
+                self._gained[law] = max(
+                    self._gained.get(law, -np.inf), logs[name] - state.evidence.log
+                )
                 best = max(best, logs[name])
                 reach[law] = max(reach.get(law, 0.0), logs[name] - log if log < np.inf else np.inf)
 
@@ -283,6 +299,27 @@ class Search:
             # Where slopes tell, the leaders hold what comes near; of walls they tell nothing.
             if reach.get(law, 0.0) > NEGLIGIBLE:
                 ask([e for e in beyond if e.trial.law == law and e.trial.name not in logs])
+        return found
+
+    def _in_place(self, state: State, of: State, ranking: Sequence[Ranked]) -> list[Ranked]:
+        """Return what of a ranking may regain enough of what was lost with an effect.
+
+        To first order as that effect itself would; of a law whose slopes do not show what it does,
+        what its fits have gained so far tells.
+        """
+        lost = of.evidence.log - state.evidence.log
+        own = max([each.gain for each in ranking if each.trial.name in of.names], default=0.0)
+        found = []
+        for each in ranking:
+            if each.trial.name in of.names:
+                continue
+            gain = lost * each.gain / own if own > 0.0 else lost
+            if not each.trial.smooth:
+                gain = self._gained.get(each.trial.law, lost)
+            if gain >= SHARE * lost:
+                found.append(each)
+            else:
+                self._asked[state.names][1][each.trial.name] = state.evidence.log + gain
         return found
 
     def _promise(self, base: State, trials: Sequence[Trial], ranking: Sequence[Ranked]) -> None:
