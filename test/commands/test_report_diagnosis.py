@@ -14,6 +14,7 @@ from wrist_stiffness.commands.diagnose import Diagnosed
 from wrist_stiffness.commands.provenance import Provenance, Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.comparing.explained import explain
+from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding, Observations
 from wrist_stiffness.inference.answer import NotExcited, Standing
 from wrist_stiffness.report.diagnosis_report import diagnosis_lines, report_of_diagnosis
@@ -75,6 +76,11 @@ def observations():
 
 MISTAKE = "Look at the set-up first: with the load's sign turned the error falls from 9 to 1 um"
 
+ABSORBED = (
+    TakenUp("registration", {"s": 700.0, "phi": 12.0}),
+    TakenUp("axis_misalignment@joint_3", {"s": 4.2, "phi": 31.0}, "tilt_u_mdeg", -43.0, 1.5),
+)
+
 PROVENANCE = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"r": "b"})
 
 
@@ -90,20 +96,22 @@ class Units:
         return len(self.measured)
 
 
-def page_of(result, observations, notes=(), mistake=""):
+def page_of(result, observations, notes=(), mistake="", proposed=()):
     n = observations.n_units
     registration = np.broadcast_to(np.diag(np.repeat(1e-3, 6)), (n, 6, 6))
     weights = np.full((n, 6), 1.0 / np.repeat([1e-6, 1e-4], 3) ** 2)
     left = explain(observations, [Units(n)], registration, np.zeros(6), weights)
     found = SimpleNamespace(
         result=result,
-        answer=SimpleNamespace(fitted=SimpleNamespace(residual=0.1 * observations.values)),
+        answer=SimpleNamespace(
+            fitted=SimpleNamespace(residual=0.1 * observations.values), absorbed=ABSORBED
+        ),
         recordings=["monday"],
         mistake=mistake,
         remarks=notes,
         provenance=PROVENANCE,
         depends=lambda: left,
-        proposed=lambda: [],
+        proposed=lambda: proposed,
     )
     return unescape(html_of(report_of_diagnosis(found)))
 
@@ -120,7 +128,6 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         "3.20 ± 0.30 µm",
         "the nodes can correct it where they get its signal",
         "another session",
-        "registration: 700 µm of s",
         "others explain far more, to first order",
         "monday: 5 spikes",
         "creep@joint_2, creep@joint_5",
@@ -128,6 +135,12 @@ def test_everything_of_a_finding_is_on_the_page(observations):
         "When motor 1 is approached",
     ):
         assert words in page, words
+    for cells in (
+        ("registration", "700", "12", "", "-"),
+        ("axis_misalignment@joint_3", "4.2", "31", "tilt_u_mdeg = -43", "1.5"),
+    ):
+        row = "".join(f"<td[^>]*>{re.escape(cell)}</td>" for cell in cells)
+        assert re.search(f"<tr>{row}</tr>", page), cells
     # The fall, and the residual against its condition.
     assert page.count("data:image/svg+xml") == 2
     assert re.search(r"log evidence against the model without it\W+td\W+td\W+\+123", page)
@@ -170,8 +183,13 @@ def test_nothing_missing_is_said_first(observations):
 def test_unknown_tells_on_what_it_depends(observations):
     left = {"s_um": 3.0, "phi_mdeg": 9.0}
     rest = replace(RESULT, findings=(), depends_on={"humidity": 0.7, "the speed": 0.3})
-    page = page_of(replace(rest, verdict="unknown", discrepancy=left), observations)
-    assert page.index("What remains") < page.index("How much it brings")
+    unknown = replace(rest, verdict="unknown", discrepancy=left)
+    command = "wrist-stiffness extend m.yaml --formula 'a_um * (x < 1)'"
+    page = page_of(unknown, observations, proposed=["Proposed law: 3 um.", f"   {command}"])
+    assert f"<p>Proposed law: 3 µm.</p>\n<pre>{command}</pre>" in page
+    assert "with the findings" not in page
+    assert page.count("data:image/svg+xml") == 1
+    assert page.index("What remains") < page.index("How large the error is")
     assert "no effect in the catalogue explains it" in page
     assert "It depends on humidity (70 %), the speed (30 %)." in page
     assert "Left above the noise: s 3 µm, phi 9 mdeg." in page

@@ -13,6 +13,7 @@ from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.page import (
     TITLES,
     Bullets,
+    Command,
     Page,
     Part,
     Picture,
@@ -78,9 +79,13 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
         ]
         verdict.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
     sections = _sections(result)
-    sections["How much it brings"].append(_fall(result))
-    remains = [*(rest_lines(result) or ["Nothing beyond the noise."]), *found.proposed()]
-    absorbed: list[Part] = [Bullets(result.absorbed)]
+    if result.findings:
+        sections["How large the error is"].append(_fall(result))
+    laws = [line.strip() for line in found.proposed()]
+    remains: list[Part] = [*(rest_lines(result) or ["Nothing beyond the noise."])]
+    remains += [Command(line) if line.startswith("wrist-stiffness ") else line for line in laws]
+    taken = found.answer.absorbed
+    absorbed: list[Part] = [_absorbed(taken)] if taken else []
     if found.remarks:
         absorbed += ["To be kept in mind:", Bullets(found.remarks)]
     whole: Sections = {
@@ -109,14 +114,16 @@ def _sections(result: Diagnosis) -> dict[str, list[Part]]:
         findings.append(f"{place}. {class_of(finding)}. {finding.evidence}")
         findings += [f"To be sure: {finding.check}."] if finding.check else []
         findings.append(_numbers(finding))
+    with_findings = [("with the findings", result.after)] if result.findings else []
     rows = (
         ("calibrated model", result.before),
-        ("with the findings", result.after),
+        *with_findings,
         ("instrument noise", result.noise),
         ("left above the noise", result.discrepancy),
     )
+    held_out = "The first two rows are" if result.findings else "The first row is"
     table = Table(
-        f"RMS. The first two rows are of held-out data: {result.scope}.",
+        f"RMS. {held_out} of held-out data: {result.scope}.",
         ["", *(TITLES[key] for key in result.before)],
         [[name, *(number(row[key]) for key in result.before)] for name, row in rows],
     )
@@ -126,7 +133,7 @@ def _sections(result: Diagnosis) -> dict[str, list[Part]]:
     unseen = [f"{', '.join(names)}: {need}" for need, names in needs.items()]
     return {
         "Findings": findings or ["No effect of the catalogue was found."],
-        "How much it brings": [table],
+        "How large the error is": [table],
         "Every candidate": [_ranking(result)],
         "What these recordings cannot show": [
             Bullets(unseen) if unseen else "Every effect of the catalogue would have shown."
@@ -252,6 +259,25 @@ def correction_of(finding: Finding) -> str:
     if find_law(law).of_measurement(place):
         return "it is in the instrument, so nothing is to be corrected"
     return "it shifts the platform and does not turn it, so only the manipulator can correct it"
+
+
+def _absorbed(absorbed: Sequence[TakenUp]) -> Table:
+    quantities = list(absorbed[0].moved)
+    rows = [
+        (
+            each.name,
+            *(number(each.moved[name]) for name in quantities),
+            f"{each.parameter} = {number(each.value)}" if each.parameter else "",
+            f"{each.deviations:.1f}" if each.parameter else "-",
+        )
+        for each in absorbed
+    ]
+    caption = (
+        "By how much set-up and tolerances moved the prediction (RMS), and the parameter that went "
+        "furthest from its drawing, in standard deviations of its prior."
+    )
+    titles = [TITLES[next(key for key in TITLES if _name(key) == name)] for name in quantities]
+    return Table(caption, ("", *titles, "furthest", "deviations"), rows)
 
 
 def absorbed_lines(absorbed: Sequence[TakenUp]) -> list[str]:

@@ -40,6 +40,7 @@ th, td { border-bottom: 1px solid #ddd; padding: 0.25rem 0.6rem; text-align: lef
 th { border-bottom: 2px solid #888; }
 .number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 li { margin: 0.3rem 0; }
+pre { background: #f3f3f3; padding: 0.6rem 1rem; font-size: 0.9rem; white-space: pre-wrap; }
 @media print { body { max-width: none; font-size: 11pt; padding: 0; } .wide { overflow: visible; }
   tr { break-inside: avoid; } h2 { break-after: avoid; } }
 """
@@ -94,6 +95,13 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Command:
+    """What can be typed into a terminal."""
+
+    text: str
+
+
+@dataclass(frozen=True)
 class Picture:
     """A drawing as SVG with one sentence below."""
 
@@ -101,7 +109,7 @@ class Picture:
     caption: str
 
 
-Part: TypeAlias = str | Bullets | Table | Picture
+Part: TypeAlias = str | Bullets | Table | Command | Picture
 """Of a section; a text is a paragraph."""
 
 Sections: TypeAlias = Mapping[str, Sequence[Part]]
@@ -171,6 +179,8 @@ def write_page(path: str | Path, page: Page) -> None:
 def _html(part: Part) -> str:
     if isinstance(part, str):
         return _each("p", [part])
+    if isinstance(part, Command):
+        return f"<pre>{escape(part.text)}</pre>"
     if isinstance(part, Bullets):
         return f"<ul>{_each('li', part.items)}</ul>"
     caption = _text(part.caption)
