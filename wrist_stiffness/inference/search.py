@@ -254,8 +254,8 @@ class Search:
         least = 0.0
         if instead_of is not None:
             least = SHARE * (instead_of.evidence.log - state.evidence.log)
-            as_noise = self._in_place(state, instead_of, as_noise)
-            beyond = self._in_place(state, instead_of, beyond)
+            as_noise = self._in_place(state, instead_of, as_noise, logs)
+            beyond = self._in_place(state, instead_of, beyond, logs)
         leaders = self._leaders(as_noise, beyond)
         others = _one_of_each_law(as_noise, leaders) if state.rough else []
         best = state.evidence.log + max(self.price, least + NEGLIGIBLE)
@@ -302,11 +302,13 @@ class Search:
                 ask([e for e in beyond if e.trial.law == law and e.trial.name not in logs])
         return found
 
-    def _in_place(self, state: State, of: State, ranking: Sequence[Ranked]) -> list[Ranked]:
+    def _in_place(
+        self, state: State, of: State, ranking: Sequence[Ranked], logs: dict[str, float]
+    ) -> list[Ranked]:
         """Return what of a ranking may regain enough of what was lost with an effect.
 
-        To first order as that effect itself would; of a law whose slopes do not show what it does,
-        what its fits have gained so far tells.
+        Its slopes tell, beside those of that effect; of a law whose slopes do not show what it
+        does, what its fits have gained so far.  `logs` gets about the log evidence of all others.
         """
         lost = of.evidence.log - state.evidence.log
         own = max([each.gain for each in ranking if each.trial.name in of.names], default=0.0)
@@ -320,7 +322,7 @@ class Search:
             if gain >= SHARE * lost:
                 found.append(each)
             else:
-                self._asked[state.names][1][each.trial.name] = state.evidence.log + gain
+                logs[each.trial.name] = state.evidence.log + gain
         return found
 
     def _promise(self, base: State, trials: Sequence[Trial], ranking: Sequence[Ranked]) -> None:
