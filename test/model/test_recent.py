@@ -54,16 +54,21 @@ def test_a_model_with_another_effect_or_one_more_is_another_one(model, make, eva
     assert not alike(found[2], found[1])
 
 
-class Heavier(Law):
-    """A platform of twice the weight."""
+class Own(Law):
+    """A user's own law without parameters."""
 
-    id = "heavier"
-    stage = "parts"
     places = ("platform",)
     sentence = check = excited_by = ""
 
     def parameters(self, place):
         return ()
+
+
+class Heavier(Own):
+    """A platform of twice the weight."""
+
+    id = "heavier"
+    stage = "parts"
 
     def changed(self, parts, place, values):
         return replace(parts, platform_weight=2.0 * parts.platform_weight)
@@ -101,16 +106,11 @@ def test_of_a_long_block_only_its_first_chunks_are_kept(model, make, evaluated):
     assert alike(again, at_first)
 
 
-class Counting(Law):
-    """A user's own law that writes into its state: the platform turns on with every sample."""
+class Counting(Own):
+    """Writes into its state: the platform turns on with every sample."""
 
     id = "counting"
     stage = "geometry"
-    places = ("platform",)
-    sentence = check = excited_by = ""
-
-    def parameters(self, place):
-        return ()
 
     def advance(self, at, place, values, state):
         state = np.zeros(1) if state is None else state

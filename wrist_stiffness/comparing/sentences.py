@@ -28,8 +28,7 @@ def sentences(found: Explained) -> tuple[str, ...]:
     if found.minor:
         names = ", ".join(each.name for each in found.minor)
         lines.append(
-            f"It also depends on {names}, but that is less than {100.0 * LEAST:g} % of the squared "
-            "error."
+            f"It also depends on {names} (each less than {100.0 * LEAST:g} % of the squared error)."
         )
     if found.perhaps:
         more = ", ".join(f"{name} ({percent(p)})" for name, p in found.perhaps.items())
