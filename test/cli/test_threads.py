@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-COMMAND = """
+WATCHED = """
 import os, sys
 
 class Watch:
@@ -18,19 +18,32 @@ class Watch:
 
 assert "numpy" not in sys.modules
 sys.meta_path.insert(0, Watch())
+"""
+
+COMMAND = """
 sys.argv = ["wrist-stiffness", "predict", "--angles", "0", "0"]
 from wrist_stiffness.__main__ import main
 sys.exit(main())
 """
 
+PYTHON = """
+from wrist_stiffness.analysis import Analysis
+print("s and so on")
+"""
 
+
+@pytest.mark.parametrize("code", [COMMAND, PYTHON], ids=["command", "Python"])
 @pytest.mark.parametrize(("said", "used"), [(None, "1"), ("3", "3")], ids=["default", "own"])
-def test_commands_set_one_thread_before_numpy_is_loaded(said, used):
+def test_one_thread_is_set_before_numpy_is_loaded(code, said, used):
     environment = {name: value for name, value in os.environ.items() if "_NUM_THREADS" not in name}
     if said is not None:
         environment["OPENBLAS_NUM_THREADS"] = said
     done = subprocess.run(
-        [sys.executable, "-c", COMMAND], env=environment, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", WATCHED + code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert done.returncode == 0, done.stderr
     seen, result = done.stdout.split("\n", 1)

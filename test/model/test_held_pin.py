@@ -130,7 +130,8 @@ def test_two_joints_hold_a_pin_in_a_stream_as_in_a_recording(model, make):
                 temperatures={name: each[row] for name, each in block.temperatures.items()},
             )
         )
-        assert np.all(np.abs(found.twist - wanted) <= 1e-12 * np.abs(at_once).max(axis=0))
+        # Rounding, ten thousand times as large beside walls that much stiffer than the flanges.
+        assert np.all(np.abs(found.twist - wanted) <= 1e-11 * np.abs(at_once).max(axis=0))
 
 
 @pytest.mark.slow

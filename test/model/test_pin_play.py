@@ -122,10 +122,10 @@ def test_a_flange_alone_presses_a_pin_into_its_wall(states):
     play = Play(RADIAL, np.zeros((1, 4)), overlap, opening, np.full((1, 1, 1), 1e-7))
     upper, _, lower, _ = play.resting()[0] / RADIAL
     assert len(states) < 8
-    # What is left of the overlap presses with 1 N per 0.1 um, and the wall gives 0.01 um.
+    # What is left of the overlap presses with 1 N per 0.1 um, and the wall gives.
     force = (5.0 - upper - 0.2 * lower) * RADIAL / 1e-7
     assert [upper - 1.0, lower - 1.0] == pytest.approx(
-        [force / 1e8 / RADIAL, 0.2 * force / 1e8 / RADIAL], rel=1e-3
+        [force / WALLS[-1] / RADIAL, 0.2 * force / WALLS[-1] / RADIAL], rel=1e-3
     )
 
 

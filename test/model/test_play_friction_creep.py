@@ -50,6 +50,16 @@ def test_end_screws_are_a_rigid_pin(model, joint):
 
 
 @pytest.mark.parametrize("joint", JOINTS)
+def test_next_to_no_play_moves_the_platform_next_to_nothing(model, make, joint):
+    """Walls yield far less than what the joints are made of: a fit that wants no play finds none."""
+    block, play = make.block(25), make.effect(f"joint_clearance@{joint}", clearance_um=1e-3)
+    without, loose = model.batch_with(block, [[], [play]])
+    moved = np.abs(loose.twist - without.twist)
+    assert 0.0 < moved[:, :3].max() < 1e-7
+    assert moved[:, 3:].max() < 5e-6
+
+
+@pytest.mark.parametrize("joint", JOINTS)
 def test_flanges_push_the_pin_back_within_its_play(model, make, joint):
     """The pin is in balance with walls and flanges, and no flange bears more than a few loads."""
     loaded = model.with_effects(make.effect(f"joint_clearance@{joint}", clearance_um=2e6 * RADIAL))

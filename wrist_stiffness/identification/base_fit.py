@@ -24,6 +24,7 @@ from wrist_stiffness.inference.outliers import OUTLIER_LIMIT, lost_units
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.law import Law
 from wrist_stiffness.sessions.columns import SessionModel
 from wrist_stiffness.sessions.unit_session import UnitSession
 from wrist_stiffness.sessions.units import Mask
@@ -259,13 +260,13 @@ def _led(problem: FitProblem, start: Array) -> BaseFit:
     return _descended(problem, problem, problem, start, NEARLY)
 
 
-def has_walls(effect: Effect) -> bool:
-    """Tell whether the law of an effect goes from wall to wall, so that it can be rounded.
+def has_walls(law: Law) -> bool:
+    """Tell whether a law goes from wall to wall, so that it can be rounded.
 
     Slopes about its absence say next to nothing, and beside it each slope of the base is a search
     for where the pins rest.
     """
-    return effect.law.rounded(ROUNDED_N[0]) is not effect.law.rounded(None)
+    return law.rounded(ROUNDED_N[0]) is not law.rounded(None)
 
 
 def _rounded(effect: Effect, force: float | None) -> Effect:

@@ -44,6 +44,10 @@ not find back, and with walls little by little."""
 FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
 """Multiples of the typed values that are tried."""
 
+PLAYS = tuple(np.geomspace(1e-3, 10.0, 9).tolist())
+"""Multiples of the usual play that are tried: play is seen from far below a micrometre on, and a
+fit that begins with too much of it does not find back."""
+
 MOST_MULTIPLES = 512
 
 
@@ -90,7 +94,10 @@ class WristProblem:
             (shape, self.table.whiten(-candidate.at(shape) * candidate.usual))
             for shape in candidate.shapes
         ]
-        return Trial(candidate.name, candidate.law.smooth, tuple(blocks), candidate.possible)
+        law = candidate.law
+        return Trial(
+            candidate.name, law.smooth, tuple(blocks), candidate.possible, walls=has_walls(law)
+        )
 
     def giving(self, fit: WristFit) -> Sequence[tuple[Array, WristFit]]:
         """Return the fits in which one more law gives, with the column (N,) which that adds."""
@@ -103,19 +110,20 @@ class WristProblem:
     def nearly(self, fit: WristFit, ranked: Ranked) -> WristFit | None:
         """Return nearly the best fit with one effect more, as `beside` does.
 
-        None where its law goes from wall to wall, so that only a whole fit tells what it does, or
-        where it finds no equilibrium.
+        None where its law finds no equilibrium.
         """
         candidate = self._catalogue(fit)[ranked.trial.name]
         try:
-            return self._nearly(fit, candidate, _begun(candidate, ranked))
+            return self._nearly(fit, candidate, ranked)
         except WristError:
             return None
 
-    def _nearly(self, fit: WristFit, candidate: WristCandidate, begun: Effect) -> WristFit | None:
-        if has_walls(begun):
-            return None
+    def _nearly(self, fit: WristFit, candidate: WristCandidate, ranked: Ranked) -> WristFit:
         if candidate not in self._near:
+            begun = candidate.effect(ranked.z, ranked.shape)
+            if has_walls(begun.law):
+                usual = begun.with_values({p.key: p.mean or p.scale for p in begun.parameters})
+                begun = _best_multiple(fit.base, self.about(fit), usual, PLAYS)
             self._near[candidate] = self.beside(fit, begun)
         return self._near[candidate]
 
@@ -162,14 +170,13 @@ class WristProblem:
         return found
 
     def _added(self, fit: WristFit, ranked: Ranked, candidate: WristCandidate) -> WristFit | None:
-        begun = _begun(candidate, ranked)
         try:
-            start = (self._nearly(fit, candidate, begun) or fit).base
-            extras = list({begun.name: begun, **start.beyond()}.values())
+            start = self._nearly(fit, candidate, ranked).base
+            extras = list(start.beyond().values())
             found = self._fitted(extras, start)
             if found.base.variance > LEAVES_MUCH and found.base.cost < HELPS * fit.base.cost:
                 tried = [found, self._fitted(extras, None)]
-                if has_walls(begun):
+                if any(has_walls(each.law) for each in extras):
                     tried.append(self._fitted(extras, fit.base, gradually=True))
                 found = min(tried, key=lambda each: each.base.cost)
         except WristError:
@@ -201,24 +208,18 @@ class WristProblem:
         models = []
         for number in range(len(self._sessions)):
             own = fit.base.model(number)
-            beside = tuple(e for e in own.effects if not (e.name in fit.names and has_walls(e)))
+            beside = tuple(e for e in own.effects if not (e.name in fit.names and has_walls(e.law)))
             models.append(replace(own, effects=beside))
         return WristPoint(tuple(models))
 
 
-def _begun(candidate: WristCandidate, ranked: Ranked) -> Effect:
-    """Return an effect with the values with which a fit begins."""
-    own = candidate.effect(ranked.z, ranked.shape)
-    if has_walls(own):
-        own = own.with_values({p.key: p.mean or p.scale for p in own.parameters})
-    return own
-
-
-def _best_multiple(fitted: BaseFit, point: WristPoint, effect: Effect) -> Effect:
+def _best_multiple(
+    fitted: BaseFit, point: WristPoint, effect: Effect, factors: Sequence[float] = FACTORS
+) -> Effect:
     """Return an effect at the multiple of its values that explains most beside a base that follows.
 
     `fitted`: what everything else explains, which to first order follows; `point`: the same, for
-    trials; `effect`: with the values that somebody typed.
+    trials; `effect`: with the values that somebody typed; `factors`: of these.
     """
     # Weights where there is no prior are tiny: QR keeps them apart from rounding.
     root, weights = np.sqrt(max(1.0, fitted.variance)), fitted.problem.weights
@@ -230,7 +231,8 @@ def _best_multiple(fitted: BaseFit, point: WristPoint, effect: Effect) -> Effect
         return np.asarray(rows - basis @ (basis.T @ rows))
 
     typed = {key: estimate.value or 1.0 for key, estimate in effect.estimates.items()}
-    factors = FACTORS if len(FACTORS) ** len(typed) <= MOST_MULTIPLES else (-1.0, 1.0)
+    if len(factors) ** len(typed) > MOST_MULTIPLES:
+        factors = (-1.0, 1.0)
     tried = [
         {key: value * f for (key, value), f in zip(typed.items(), each, strict=True)}
         for each in islice(product(factors, repeat=len(typed)), MOST_MULTIPLES)

@@ -56,6 +56,8 @@ class Trial:
     # unknown, whitened, in standard deviations of the priors
     blocks: tuple[tuple[tuple[float, ...], Array], ...]
     possible: Possible  # what the unknowns can be
+    # whether it goes from wall to wall: a quick fit then tells whether there is any play at all
+    walls: bool = False
 
     @property
     def law(self) -> str:
@@ -87,7 +89,7 @@ class Problem(Protocol):
         """Return the candidates about a fit."""
 
     def nearly(self, fit: Any, ranked: Ranked) -> Any | None:
-        """Return nearly the best fit with one effect more; None where only a whole fit can tell."""
+        """Return nearly the best fit with one effect more; None where it finds no equilibrium."""
 
     def giving(self, fit: Any) -> Sequence[tuple[Array, Any]]:
         """Return the fits in which one more law gives, with the column (N,) which that adds."""
@@ -349,6 +351,9 @@ class Search:
                 log = evidence(near.point, self._problem.background, state.evidence).log
                 if not state.names:
                     self.promised[each.trial.name] = log - state.evidence.log
+                if each.trial.walls and log > state.evidence.log:
+                    # How much it explains, only a whole fit tells.
+                    log = np.inf
             found.append((log, each))
         return sorted(found, key=lambda pair: -pair[0])
 

@@ -25,8 +25,8 @@ SMALL_FORCE = 1e-2
 OF_ALL = ("radial", "small_force")
 """Fields of `Play` that all samples share."""
 
-WALLS = (1e6, 1e7, 1e8)
-"""Stiffness of the walls [N/m]: into the last one 1 N presses an end by 10 nm, and softer ones lead
+WALLS = (1e6, 1e8, 1e10)
+"""Stiffness of the walls [N/m]: into the last one 100 N press an end by 10 nm, and softer ones lead
 there where rest is not found at once."""
 
 FORCE_TOLERANCE, ROUGH_TOLERANCE = 1e-8, 1e-2
