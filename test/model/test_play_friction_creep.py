@@ -51,7 +51,7 @@ def test_end_screws_are_a_rigid_pin(model, joint):
 
 @pytest.mark.parametrize("joint", JOINTS)
 def test_next_to_no_play_moves_the_platform_next_to_nothing(model, make, joint):
-    """Walls yield far less than what the joints are made of: a fit that wants no play finds none."""
+    """Walls yield far less than the joints themselves: a fit that wants no play finds none."""
     block, play = make.block(25), make.effect(f"joint_clearance@{joint}", clearance_um=1e-3)
     without, loose = model.batch_with(block, [[], [play]])
     moved = np.abs(loose.twist - without.twist)

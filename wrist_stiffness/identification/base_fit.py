@@ -71,7 +71,6 @@ class BaseFit:
     # (u, 6, p), change of what is left by a step of each unknown [m, rad], from where the last step
     # began
     columns: Array
-    arrived: bool  # whether the steps settled
     bare: FitProblem  # the base alone
     firm: FitProblem  # the base with those extras beside which its columns are taken
 
@@ -315,10 +314,10 @@ def _descended(
             z, residual = trial, tried
         small = cooled and before - after < enough * before
         if small and (fresh or kept):
-            return BaseFit(problem, z, residual, columns, True, bare, firm)
+            return BaseFit(problem, z, residual, columns, bare, firm)
         if small or near is None:
             columns = None
-    return BaseFit(problem, z, residual, _columns(problem, firm, z), False, bare, firm)
+    return BaseFit(problem, z, residual, _columns(problem, firm, z), bare, firm)
 
 
 def _columns(

@@ -33,8 +33,8 @@ MOST_ROUNDS = 10
 SMALL_GAIN = 1e-2
 """A fit has settled where twice the log posterior gains no more: a tenth of an uncertainty."""
 
-LARGE_GAIN = 1.0
-"""An uncertainty: where a fit ends further from the maximum, at a kink, that is said."""
+FAR = 1.0
+"""Standard uncertainties: where a fit ends further from the maximum, at a kink, that is said."""
 
 MOST_HALVINGS = 8
 
@@ -49,6 +49,7 @@ class WristFit:
     base: BaseFit  # set-up, tolerances and effects
     table: WristTable  # of the same units
     gives: tuple[Give, ...] = ()  # in which ways laws of the set give
+    off: float = 0.0  # from the maximum of the posterior, in standard uncertainties of all unknowns
 
     @property
     def names(self) -> Collection[str]:
@@ -78,8 +79,8 @@ class WristFit:
 
     @property
     def arrived(self) -> bool:
-        """Whether the steps settled."""
-        return self.base.arrived
+        """Whether it ended within its uncertainty."""
+        return self.off < FAR
 
     @property
     def lost(self) -> int:
@@ -294,7 +295,7 @@ class WristFit:
                 break
             else:
                 fit, here = replace(fit, base=fit.base.with_columns_here()), True
-        return replace(fit, base=replace(fit.base, arrived=gain < LARGE_GAIN))
+        return replace(fit, off=float(np.sqrt(gain)))
 
     def _step(self, found: Evidence) -> tuple[Array, float]:
         """Return the step to the maximum within the bounds (p,), and its gain to second order."""

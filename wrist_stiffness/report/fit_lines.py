@@ -116,7 +116,10 @@ def used_lines(sessions: Sequence[MeasuredSession], found: WristFit) -> list[str
     ]
     lines += [f"  {session.name}: {remark}" for session in sessions for remark in session.remarks]
     if not found.arrived:
-        lines.append("the fit did not converge: its numbers are uncertain")
+        lines.append(
+            f"the fit ended {found.off:.1f} standard uncertainties short of its best values: a "
+            "contact opens or closes there"
+        )
     return lines
 
 
