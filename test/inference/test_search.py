@@ -1,6 +1,6 @@
 """The search where slopes promise more than any fit keeps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -187,6 +187,47 @@ def test_of_walls_slopes_tell_nothing_so_the_law_that_leads_is_asked_everywhere(
     search = Search(Walled(rng), most_effects=1)
     search.run()
     assert search.best.names == {"play@true"}
+
+
+def test_walls_are_fitted_whole_where_a_quick_fit_finds_any_play(rng):
+    """What play explains, the quick fit does not tell; but where it finds none, there is none."""
+    cause = rng.normal(size=ROWS)
+
+    class Quick(Disappointing):
+        def __init__(self, rng):
+            super().__init__(rng, 1.0)
+            self.left = 6.0 * cause + rng.normal(size=ROWS)
+            self.quick = {}
+            for name, shares in {
+                "rival@place": (0.7, 0.7, 0.7),
+                "play@true": (0.6, 0.4, 1.0),
+                "play@sound": (0.6, 0.0, 0.0),
+            }.items():
+                found = [s * cause + np.sqrt(1.0 - s**2) * rng.normal(size=ROWS) for s in shares]
+                self.slopes[name], self.quick[name], self.whole[name] = (e[:, None] for e in found)
+            self.slopes = {name: self.slopes[name] for name in self.quick}
+            sound, towards = self.quick["play@sound"], self.left / np.linalg.norm(self.left)
+            sound -= np.outer(towards, towards @ sound)
+            self.fitted_whole = []
+
+        def trials(self, fit):
+            return [replace(t, walls=t.law == "play") for t in super().trials(fit)]
+
+        def nearly(self, fit, ranked):
+            whole, self.whole = self.whole, self.quick
+            found = self.fitted((*fit.names, ranked.trial.name))
+            self.whole = whole
+            return found
+
+        def added(self, fit, ranked):
+            self.fitted_whole.append(ranked.trial.name)
+            return super().added(fit, ranked)
+
+    problem = Quick(rng)
+    search = Search(problem, most_effects=1)
+    search.run()
+    assert search.best.names == {"play@true"}
+    assert "play@sound" not in problem.fitted_whole
 
 
 def test_in_place_of_an_effect_only_what_may_regain_half_of_it_is_asked(rng):
