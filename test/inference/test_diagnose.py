@@ -126,6 +126,15 @@ def test_a_shape_is_found_between_the_points_of_its_grid(rng):
     assert abs(value - 5.2) < 4.0 * error < 0.6
 
 
+def test_a_shape_is_that_of_the_data_however_much_larger_than_usual_the_effect_is(rng):
+    power = law(
+        "power", lambda c, p: c["t"] ** p, (ShapeParameter("p", (0.5, 1.0, 1.5, 2.5, 4.0)),)
+    )
+    units = Observations(rng.normal(size=(150, 2)), {"t": np.linspace(0.0, 1.0, 150)}, NOISE)
+    (finding,) = diagnose(planted(units, (power, 200.0, 2.0)), (power,), (ZERO,)).findings
+    assert finding.parameters["p"][0] == pytest.approx(2.0, abs=0.03)
+
+
 def test_an_impossible_sign_is_not_named(rng):
     soft = law("soft", lambda c: c["x"] * c["z"], lower=0.0)
     wrong = diagnose(planted(table(rng), (CROSS, -4.0)), (soft,), (ZERO,))

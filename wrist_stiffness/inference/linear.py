@@ -17,7 +17,7 @@ from wrist_stiffness.inference.candidates import (
     Nuisance,
     nuisance_columns,
 )
-from wrist_stiffness.inference.evidence import size_weight
+from wrist_stiffness.inference.evidence import log_size_prior, size_weight
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
@@ -63,6 +63,16 @@ class LinearFit:
         for name, term in self.terms.items():
             found[name] = np.arange(first, first + len(term.candidate.parameters))
             first += len(term.candidate.parameters)
+        return found
+
+    @property
+    def cost(self) -> float:
+        """Minus twice the log posterior, up to what all fits to the table share."""
+        columns = self.problem.columns(tuple(self.terms.values()))
+        left, base = self.problem.white - columns @ self.z, self.z[: self.problem.n_nuisances]
+        found = float(left @ left + base @ base)
+        for places in self.places.values():
+            found -= 2.0 * float(log_size_prior(np.sum(self.z[places] ** 2), len(places)))
         return found
 
     def change(self, name: str) -> Array:
@@ -269,10 +279,9 @@ class LinearProblem:
 
         def cost(scaled: Array) -> float:
             shape = tuple((scaled * width).tolist())
-            found = self.fitted({**terms, name: Term(candidate, shape)})
-            left = self.white - self.columns(tuple(found.terms.values())) @ found.z
+            found = self.fitted({**terms, name: Term(candidate, shape)}).cost
             self._evaluated.pop((name, shape), None)
-            return float(left @ left + found.z @ found.z)
+            return found
 
         bounds = [(low / w, high / w) for (low, high), w in zip(limits, width, strict=True)]
         begin = np.array(start) / width
