@@ -26,7 +26,7 @@ from scipy.special import gammaln
 
 from wrist_stiffness.inference.giving import SPREAD, Give
 from wrist_stiffness.inference.point import Background, Group, Point
-from wrist_stiffness.inference.possible import TAIL, Possible
+from wrist_stiffness.inference.possible import TAIL, Possible, within_bounds
 from wrist_stiffness.inference.projection import NEGLIGIBLE
 
 Array = NDArray[np.float64]
@@ -425,14 +425,21 @@ def _gain(
     """
     if possible is None:
         return float(gain), z
-    free = np.ones(len(z), dtype=bool)
-    while (beyond := free & ((z < possible.lower) | (z > possible.upper))).any():
-        free &= ~beyond
-        z = np.clip(z, possible.lower, possible.upper)
+
+    def solve(free: NDArray[np.bool_], z: Array) -> Array:
+        nonlocal gain, precision
+        if not free.any():
+            gain = 0.0
+            return z
+        z, at = z.copy(), np.flatnonzero(free)
         rest = slope - information @ np.where(free, 0.0, z)
-        (gain,), (z[free],), (precision,) = modes(
-            information[np.ix_(free, free)][None], rest[None, free]
-        )
+        (gain,), (z[at],), (precision,) = modes(information[np.ix_(at, at)][None], rest[None, at])
+        return z
+
+    def inwards(z: Array) -> Array:
+        return np.asarray(slope - information @ z - size_weight(z @ z, len(z)) * z)
+
+    z, free = within_bounds(z, possible.lower, possible.upper, solve, inwards)
     if not free.any():
         # What stays at its bounds keeps its prior: data that say no more are no evidence.
         return gain + float(slope @ z - 0.5 * z @ information @ z), z

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from wrist_stiffness.inference.evidence import log_size_prior, size_weight
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
-from wrist_stiffness.inference.possible import Possible
+from wrist_stiffness.inference.possible import Possible, within_bounds
 from wrist_stiffness.inference.projection import SQUARED_ROUNDING
 from wrist_stiffness.inference.search import Ranked, Trial
 
@@ -226,15 +225,15 @@ class LinearProblem:
         bare = LinearFit(self, terms, np.zeros(columns.shape[1]))
         gram, target = columns.T @ columns, columns.T @ self.white
         lower, upper = self._bounds(bare)
-        held = np.zeros(len(target), dtype=bool)
-        z = bare.z
-        for _ in range(len(target) + 1):
-            z = _solved(gram, target, bare.places, held, z)
-            beyond = ~held & ((z < lower) | (z > upper))
-            if not beyond.any():
-                break
-            held |= beyond
-            z = np.clip(z, lower, upper)
+
+        def solve(free: NDArray[np.bool_], z: Array) -> Array:
+            return _solved(gram, target, bare.places, free, z)
+
+        def slope(z: Array) -> Array:
+            return np.asarray(target - gram @ z - _weights(z, bare.places) * z)
+
+        z = solve(np.ones(len(target), dtype=bool), bare.z)
+        z, _ = within_bounds(z, lower, upper, solve, slope)
         return LinearFit(self, terms, z)
 
     def held(self, fit: LinearFit) -> NDArray[np.bool_]:
@@ -324,24 +323,31 @@ def _simplex(begin: Array, bounds: Sequence[tuple[float, float]]) -> Array:
 def _solved(
     gram: Array,
     target: Array,
-    effects: Mapping[str, Any],
-    held: NDArray[np.bool_],
+    effects: Mapping[str, NDArray[np.intp]],
+    free: NDArray[np.bool_],
     z: Array,
 ) -> Array:
-    """Return the most probable unknowns where those that are held stay, (p,)."""
-    z = np.where(held, z, 0.0)
+    """Return the most probable unknowns where those that are not free stay, (p,)."""
+    z = np.where(free, 0.0, z)
     if not len(target):
         return z
     # The tails of the priors first: a large effect is found from their side.
     weight = np.ones(len(target))
     for places in effects.values():
         weight[places] = 1e-8
-    free = np.flatnonzero(~held)
-    rest = target - gram[:, held] @ z[held]
+    rest = target - gram[:, ~free] @ z[~free]
+    at = np.flatnonzero(free)
     for _ in range(ROUNDS if effects else 1):
-        information = gram[np.ix_(free, free)] + np.diag(weight[free])
+        information = gram[np.ix_(at, at)] + np.diag(weight[at])
         scale = 1.0 / np.sqrt(np.diag(information))
-        z[free] = scale * np.linalg.solve(information * scale[:, None] * scale, scale * rest[free])
-        for places in effects.values():
-            weight[places] = size_weight(float(np.sum(z[places] ** 2)), len(places))
+        z[at] = scale * np.linalg.solve(information * scale[:, None] * scale, scale * rest[at])
+        weight = _weights(z, effects)
     return z
+
+
+def _weights(z: Array, effects: Mapping[str, NDArray[np.intp]]) -> Array:
+    """Return the precisions of Gaussian priors with the slopes of those of the unknowns, (p,)."""
+    weight = np.ones(len(z))
+    for places in effects.values():
+        weight[places] = size_weight(float(np.sum(z[places] ** 2)), len(places))
+    return weight
