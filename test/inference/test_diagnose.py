@@ -231,6 +231,27 @@ def test_repeated_conditions_fix_a_noise_that_is_not_told(rng):
     assert result.discrepancy["value_si"] > 2.0
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_that_nothing_tells_is_found_far_below_what_a_rough_model_leaves(seed):
+    """Thirty waves for sixty numbers: the rough model can hold no more than a few of them."""
+    rng = np.random.default_rng(seed)
+    speeds, phases = rng.uniform(5, 60, 30), rng.uniform(0, 6, 30)
+    units = Observations(rng.normal(size=(60, 1)), {"x": rng.uniform(-1, 1, 60)})
+
+    def wave(n):
+        def columns(table, shape):
+            return np.sin(speeds[n] * table.covariate("x") + phases[n])[:, None, None]
+
+        return Candidate(f"wave {n}", "part", (Parameter("size"),), columns)
+
+    waves = [wave(n) for n in range(30)]
+    truth = zip(waves, (20.0, -15.0, 10.0), strict=False)
+    values = units.values + sum(size * each.evaluate(units, ())[:, :, 0] for each, size in truth)
+    result = diagnose(units.with_values(values), waves, ordered=False)
+    assert named(result) == {f"wave {n}@part" for n in range(3)}
+    assert result.noise["value_si"] == pytest.approx(1.0, rel=0.25)
+
+
 def test_ten_rows_of_nine_numbers_get_an_answer(rng):
     x = np.linspace(-1.0, 1.0, 10)
     own = rng.normal(size=9)

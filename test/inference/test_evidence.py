@@ -7,11 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
-from scipy.stats import multivariate_normal, multivariate_t
+from scipy.stats import halfnorm, multivariate_normal, multivariate_t, norm
 from scipy.stats import t as student_t
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.evidence import Evidence, log_size_prior
+from wrist_stiffness.inference.evidence import (
+    MISFIT,
+    MOST_MISFIT,
+    Evidence,
+    log_excess,
+    log_size_prior,
+)
 from wrist_stiffness.inference.point import Background, Group, Point
 from wrist_stiffness.inference.possible import TAIL, Possible
 
@@ -215,6 +221,16 @@ def test_an_effect_that_the_set_up_nearly_takes_up_counts_by_what_is_seen_of_it(
             left, shape, columns = beyond @ left, beyond @ shape, beyond @ columns
         expected = (left @ shape) ** 2 / (shape @ shape) / (columns[:, 0] @ columns[:, 0])
         assert at.rest("a") == pytest.approx(expected, rel=1e-2)
+
+
+@pytest.mark.parametrize("width", [0.2, 3.0])
+def test_noise_far_below_the_known_one_has_a_prior(width):
+    x = np.array([-20.0, -2.0, -0.5, 0.1, 1.0, 3.0])
+    found = log_excess(np.exp(x), width)
+    known = (1.0 - MISFIT) * norm(0.0, width).pdf(x)
+    expected = known + MISFIT * halfnorm(0.0, MOST_MISFIT).pdf(x)
+    assert found[1:] == pytest.approx(np.log(expected[1:]))
+    assert found[0] == pytest.approx(np.log(1.0 - MISFIT) + norm(0.0, width).logpdf(x[0]))
 
 
 def test_what_is_attainable_is_the_evidence_of_noise_alone(rng):

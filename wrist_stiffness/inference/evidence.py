@@ -37,6 +37,9 @@ MISFIT = 0.05
 MOST_MISFIT = 3.0
 """Standard deviation of the logarithm of that excess variance (assumed)."""
 
+SURE_OF_NOISE = 3.0
+"""Widths by which noise may be more than is known of it; beyond, it is a misfit."""
+
 SURPRISE = 2.0
 """Standard deviations of the logarithm of a drift's amplitude that no instrument reaches, but one
 of 40."""
@@ -307,10 +310,15 @@ class Evidence:
         return smooth * share / count + self.misfit
 
     @property
+    def noise(self) -> float:
+        """Variance of the noise in units of the known one: the excess, where it is no misfit."""
+        known = SURE_OF_NOISE * self.background.noise_width
+        return self.excess if np.log(self.excess) <= known else 1.0
+
+    @property
     def misfit(self) -> float:
         """Excess of the scatter that no wrongly known noise explains."""
-        known = 3.0 * self.background.noise_width
-        return self.excess - 1.0 if np.log(self.excess) > known else 0.0
+        return self.excess - self.noise
 
     def rest(self, name: str) -> float:
         """Return how much of an effect is left in its own shape, 0 where its law is right.
@@ -508,6 +516,8 @@ def log_amplitude(size: float, group: Group, count: int) -> float:
 def log_excess(excess: Array, width: float) -> Array:
     """Return the log prior of the excess: the noise as known, or something unknown beside it."""
     x = np.log(excess)
-    known = np.exp(-0.5 * (x / width) ** 2) / width
-    other = np.where(x > 0.0, 2.0 * np.exp(-0.5 * (x / MOST_MISFIT) ** 2) / MOST_MISFIT, 0.0)
-    return np.asarray(np.log(((1.0 - MISFIT) * known + MISFIT * other) / np.sqrt(2.0 * np.pi)))
+    known = np.log((1.0 - MISFIT) / width) - 0.5 * (x / width) ** 2
+    other = np.log(2.0 * MISFIT / MOST_MISFIT) - 0.5 * (x / MOST_MISFIT) ** 2
+    # Logarithms throughout: far below 1 no density would be left.
+    both = np.logaddexp(known, np.where(x > 0.0, other, -np.inf))
+    return np.asarray(both - 0.5 * np.log(2.0 * np.pi))

@@ -10,6 +10,9 @@ from scipy.sparse import csr_array
 
 from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations
 
+LAW_RANK = 8
+"""Columns of the error of one law."""
+
 
 def own_covariance(observations: Observations, covariance: Array) -> Array:
     """Return the covariance of each unit without what it shares, (n, m, m).

@@ -237,8 +237,7 @@ class _Judge:
 
 def _noise(state: State, table: Table) -> Array:
     """Variance (m,) of a unit by the noise alone."""
-    known = float(np.exp(3.0 * table.noise_width))
-    return table.variance * (state.evidence.excess if state.evidence.excess <= known else 1.0)
+    return table.variance * state.evidence.noise
 
 
 def _discrepancy(state: State, table: Table) -> Array:
