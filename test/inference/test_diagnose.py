@@ -119,6 +119,22 @@ def test_what_cannot_be_told_apart_shares_a_class(rng):
     assert finding.probability >= 0.95
 
 
+@pytest.mark.parametrize("size", [3e3, 1e4, 1e6])
+def test_parameters_that_the_data_cannot_separate_share_what_they_do(rng, size):
+    """One weight at one place: its moment is as much larger or smaller as its force."""
+
+    def columns(table, shape):
+        return table.covariate("x")[:, None, None] * [1.0, 0.5]
+
+    spring = Candidate("spring", "part", (Parameter("per_N"), Parameter("per_Nm")), columns)
+    x = rng.uniform(-1.0, 1.0, 80)
+    units = Observations((size * x + rng.normal(size=80))[:, None], {"x": x}, np.eye(1))
+    (finding,) = diagnose(units, (spring,)).findings
+    (force, error), (moment, _) = (finding.parameters[name] for name in ("per_N", "per_Nm"))
+    assert force + 0.5 * moment == pytest.approx(size, rel=2e-3)
+    assert error > 0.3 * size
+
+
 def test_a_shape_is_found_between_the_points_of_its_grid(rng):
     result = diagnose(planted(table(rng, 150), (WAVE, 5.0, 5.2)), LAWS, (ZERO,))
     (finding,) = result.findings

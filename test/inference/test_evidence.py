@@ -17,6 +17,7 @@ from wrist_stiffness.inference.evidence import (
     Evidence,
     log_excess,
     log_size_prior,
+    modes,
 )
 from wrist_stiffness.inference.point import Background, Group, Point
 from wrist_stiffness.inference.possible import TAIL, Possible
@@ -132,6 +133,16 @@ def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size)
     assert gain == pytest.approx(exact, abs=0.1)
     first_order = Evidence(without, mute, one, 1.0).gains([-column])[0][0]
     assert first_order == pytest.approx(exact, abs=0.1)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e4, 1e8])
+def test_unknowns_that_do_the_same_gain_what_one_does(rng, size):
+    column = size * rng.normal(size=ROWS)
+    columns = column[:, None] * [1.0, 0.5]
+    left = 3.0 * column + rng.normal(size=ROWS)
+    (gain,), (z,), _ = modes((columns.T @ columns)[None], (columns.T @ left)[None])
+    assert z @ [1.0, 0.5] == pytest.approx(left @ column / (column @ column), rel=0.05)
+    assert gain == pytest.approx(0.5 * (left @ column) ** 2 / (column @ column), rel=0.3)
 
 
 def test_what_cannot_be_explains_nothing(rng):

@@ -44,6 +44,10 @@ SURPRISE = 2.0
 """Standard deviations of the logarithm of a drift's amplitude that no instrument reaches, but one
 of 40."""
 
+LEAST_PRIOR = 1e-12
+"""Least precision of a prior as a share of the information: what the data cannot tell apart stays
+solvable in the rounding of numbers."""
+
 OFF = 1e-3
 """Amplitude of a group that is absent, in scatters of a unit."""
 
@@ -468,8 +472,10 @@ def modes(information: Array, slope: Array) -> tuple[Array, Array, Array]:
     """
     count = slope.shape[1]
     found = []
+    least = LEAST_PRIOR * information.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0)
     for weight in (np.full(len(slope), 1.0), np.full(len(slope), 1e-8)):
         for _ in range(5):
+            weight = np.maximum(weight, least)
             whole = information + weight[:, None, None] * np.eye(count)
             z = np.asarray(np.linalg.solve(whole, slope[..., None])[..., 0], dtype=np.float64)
             square = _dots(z, z)

@@ -16,7 +16,7 @@ from wrist_stiffness.inference.candidates import (
     Nuisance,
     nuisance_columns,
 )
-from wrist_stiffness.inference.evidence import log_size_prior, size_weight
+from wrist_stiffness.inference.evidence import LEAST_PRIOR, log_size_prior, size_weight
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
@@ -340,7 +340,8 @@ def _solved(
     for _ in range(ROUNDS if effects else 1):
         information = gram[np.ix_(at, at)] + np.diag(weight[at])
         scale = 1.0 / np.sqrt(np.diag(information))
-        z[at] = scale * np.linalg.solve(information * scale[:, None] * scale, scale * rest[at])
+        scaled = information * scale[:, None] * scale + LEAST_PRIOR * np.eye(len(at))
+        z[at] = scale * np.linalg.solve(scaled, scale * rest[at])
         weight = _weights(z, effects)
     return z
 
