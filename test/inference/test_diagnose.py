@@ -13,6 +13,7 @@ from wrist_stiffness.inference import (
     Nuisance,
     Observations,
     Parameter,
+    Quantity,
     ShapeParameter,
     diagnose,
     load_predictor,
@@ -181,6 +182,18 @@ def test_an_effect_outside_the_catalogue_is_unknown_and_told_by_its_condition(rn
     assert result.findings == ()
     assert next(iter(result.depends_on)) == "z"
     assert result.discrepancy["value_si"] > 1.0
+
+
+def test_what_no_law_explains_is_told_of_the_quantity_that_has_it(rng):
+    each = Quantity("first", "um", (0,)), Quantity("second", "um", (1,))
+    units = table(rng, 200, quantities=each)
+    beyond = 8.0 * np.sin(6.0 * units.covariates["x"])
+    values = units.values + beyond[:, None] * [0.0, 1.0]
+    result = diagnose(units.with_values(values), (SIGN,), (ZERO,))
+    assert result.verdict == "unknown"
+    assert result.discrepancy["first_um"] == 0.0
+    unexplained = float(np.sqrt(np.mean(beyond**2)))
+    assert result.discrepancy["second_um"] == pytest.approx(unexplained, rel=0.1)
 
 
 def test_drift_of_the_instrument_is_not_named_and_only_where_rows_have_an_order():

@@ -86,7 +86,7 @@ class WristTable(Whitened):
         # What the columns of a drift cannot follow is scatter of each unit by itself.
         beyond = unresolved(wander) + PASSING**2 * unresolved(short)
         own = own + (beyond[:, None] * self.drift**2)[:, :, None] * each_its_own
-        self.variance: Array = np.diagonal(own, axis1=1, axis2=2)
+        self.variance = np.diagonal(own, axis1=1, axis2=2)
         super().__init__(left, own, low_rank(alike(left.covariates), LAW_RANK)[0])
         asked, usual = ask(left.covariates), np.sqrt(np.median(self.variance, axis=0))
         self.background = background(self, asked, usual, width, self.drift, wander, short)
@@ -108,12 +108,3 @@ class WristTable(Whitened):
     def _scatter_of(self, found: Evidence) -> Array:
         """Variance of each unit by noise, as far as the excess is no misfit."""
         return self._scatter * found.noise
-
-    def above(self, found: Evidence) -> dict[str, float]:
-        """Return what is left above that noise, RMS by quantity."""
-        own = np.zeros_like(self.variance)
-        for quantity in self.observations.quantities:
-            at = list(quantity.components)
-            count = max(int(self.observations.measured[:, at].sum()), 1)
-            own[:, at] = self.variance[:, at] * found.left_of(quantity.name, count)
-        return self.observations.rms(own)

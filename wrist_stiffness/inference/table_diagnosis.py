@@ -140,7 +140,7 @@ def diagnose(
         reading.verdict,
         reading.probability,
         seen.rms(_noise(reading.state, table)),
-        seen.rms(_discrepancy(reading.state, table)),
+        table.above(reading.state.evidence),
         {q.key: before.rmse(q) for q in seen.reported},
         {q.key: after.rmse(q) for q in seen.reported},
         tuple(
@@ -238,12 +238,6 @@ class _Judge:
 def _noise(state: State, table: Table) -> Array:
     """Variance (m,) of a unit by the noise alone."""
     return table.variance * state.evidence.noise
-
-
-def _discrepancy(state: State, table: Table) -> Array:
-    """Variance (m,) above that noise."""
-    share = state.evidence.unexplained / max(len(state.evidence.point.left), 1)
-    return table.variance * share
 
 
 def _finding(
