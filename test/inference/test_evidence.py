@@ -111,6 +111,20 @@ def test_where_an_effect_acts_is_priced_as_a_tolerance_however_large_it_is(rng):
     assert one.cost(place) == pytest.approx(other.cost(tolerance))
 
 
+def test_no_product_of_other_columns_is_kept(rng):
+    point, ground = linear(rng)
+    at = Evidence(point, ground, np.array([0.5, 1.0]), 1.0)
+    assert at.log == Evidence(point.moved(np.zeros(2)), ground, at.amplitude, 1.0).log
+    for change in ({"columns": 2.0 * point.columns}, {"inexact": 2.0 * point.inexact}):
+        other = {n: getattr(point, n) for n in ("left", "columns", "z", "weight", "effects")}
+        fresh = Point(**{**other, "inexact": point.inexact, "linear": True, **change})
+        assert replace(at, point=replace(point, **change)).log == replace(at, point=fresh).log
+    groups = tuple(replace(each, columns=2.0 * each.columns) for each in ground.groups)
+    part, fresh = replace(ground, groups=groups), Background(groups, 0.2)
+    assert ground.part([0]).gram.any()
+    assert np.array_equal(part.part([0]).gram, fresh.part([0]).gram)
+
+
 @pytest.mark.parametrize("size", [0.0, 3.0, 30.0])
 def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size):
     column = rng.normal(size=(ROWS, 1))
@@ -202,9 +216,7 @@ def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):
     varied = 9.0 * point.columns * rng.normal(size=(ROWS, 2))
     point = replace(point, left=point.left + 3.0 * varied[:, 0], varied={"a": varied})
     exact, nearly, hardly = (
-        Evidence(
-            replace(point, inexact=share * varied, _beside={}), ground, np.full(2, 0.5), 0.1
-        ).rest("a")
+        Evidence(replace(point, inexact=share * varied), ground, np.full(2, 0.5), 0.1).rest("a")
         for share in (0.0, 1.0, 100.0)
     )
     assert exact > 2.0 * nearly > 0.0
@@ -250,8 +262,8 @@ def test_what_is_attainable_is_the_evidence_of_noise_alone(rng):
     everything = np.hstack([point.columns, point.inexact, drift.columns])
     noise = rng.normal(size=ROWS)
     noise -= everything @ np.linalg.lstsq(everything, noise, rcond=None)[0]
-    alone = replace(point, left=noise * np.sqrt(ROWS) / np.linalg.norm(noise), _beside={})
+    alone = replace(point, left=noise * np.sqrt(ROWS) / np.linalg.norm(noise))
     best = Evidence(alone, drift, np.array([0.5]), 1.0)
     assert best.attainable == pytest.approx(best.log, abs=1e-9)
-    at = Evidence(replace(point, left=20.0 * point.left, _beside={}), ground, np.full(2, 3.0), 2.0)
+    at = Evidence(replace(point, left=20.0 * point.left), ground, np.full(2, 3.0), 2.0)
     assert at.attainable == pytest.approx(best.log, abs=1e-9)

@@ -499,7 +499,7 @@ def _dots(one: Array, other: Array) -> Array:
 def known_noise(point: Point, background: Background) -> Evidence:
     """Return a fitted set beside noise and drift as they are known; laws give, nothing else."""
     own = np.arange(point.inexact.shape[1]) < len(point.gives)
-    exact = replace(point, inexact=np.where(own, 1.0, OFF) * point.inexact, _beside={})
+    exact = replace(point, inexact=np.where(own, 1.0, OFF) * point.inexact)
     return beside_known(exact, background)
 
 
