@@ -175,6 +175,39 @@ def test_what_stands_at_a_bound_leaves_the_rest_to_the_others(rng):
     assert finding.parameters["other"][0] == 0.0
 
 
+def test_what_stands_at_a_bound_is_known_as_well_as_the_data_know_it(rng):
+    def columns(table, shape):
+        x, z = table.covariate("x"), table.covariate("z")
+        return np.stack([x, x + 0.5 * z], axis=1)[:, None, :]
+
+    sizes = Parameter("one", 0.0, plausible=3.0), Parameter("other", 0.0, plausible=3000.0)
+    both = Candidate("spring", "pair", sizes, columns)
+    x, z = rng.uniform(-1.0, 1.0, (2, 300))
+    values = 8.0 * x - z + rng.normal(size=300)
+    units = Observations(values[:, None], {"x": x, "z": z}, np.eye(1))
+    (finding,) = diagnose(units, (both,)).findings
+    value, error = finding.parameters["other"]
+    assert value == 0.0
+    # It is what z leaves, 2 over the root of 100, beside a scatter that the bound enlarges.
+    assert 0.2 < error < 0.4
+
+
+def test_what_is_at_its_most_explains_what_it_can(rng):
+    stop = Candidate(
+        "stop",
+        "part",
+        (Parameter("size", 0.0, 5.0, plausible=3.0),),
+        lambda table, shape: table.covariate("x")[:, None, None],
+    )
+    x = rng.uniform(-1.0, 1.0, 100)
+    units = Observations((5.2 * x + rng.normal(size=100))[:, None], {"x": x}, np.eye(1))
+    result = diagnose(units, (stop,))
+    (standing,) = result.standings
+    assert standing.log_gain > 5.0
+    (finding,) = result.findings
+    assert finding.parameters["size"][0] == 5.0
+
+
 def test_an_effect_outside_the_catalogue_is_unknown_and_told_by_its_condition(rng):
     outside = law("ripple", lambda c: np.cos(5.0 * c["z"]))
     result = diagnose(planted(table(rng, 150), (outside, 4.0)), (LINEAR, SQUARE), (ZERO,))

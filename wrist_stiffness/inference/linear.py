@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from wrist_stiffness.inference.candidates import (
     Nuisance,
     nuisance_columns,
 )
-from wrist_stiffness.inference.evidence import LEAST_PRIOR, log_size_prior, size_weight
+from wrist_stiffness.inference.evidence import LEAST_PRIOR, Evidence, log_size_prior, size_weight
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
@@ -82,6 +82,15 @@ class LinearFit:
 
     @cached_property
     def point(self) -> Point:
+        """Where the fit ended, as the evidence takes it: what stands at a bound stays there."""
+        held, whole = self.problem.held(self), self.whole
+        if not held.any():
+            return whole
+        moves = np.concatenate([~held, np.ones(len(whole.z) - len(held), dtype=bool)])
+        return replace(whole, columns=whole.columns * moves, linear=False)
+
+    @cached_property
+    def whole(self) -> Point:
         """Where the fit ended, whitened."""
         problem, table = self.problem, self.problem.table
         columns = problem.columns(tuple(self.terms.values()))
@@ -91,8 +100,6 @@ class LinearFit:
         bent = [problem.tangents(self, name) for name in self.terms]
         free = np.concatenate([np.zeros((len(columns), 0)), *bent], axis=1)
         p = columns.shape[1]
-        held = problem.held(self)
-        columns = columns * ~held
         return Point(
             problem.white - columns @ self.z,
             np.concatenate([-columns, -free], axis=1),
@@ -101,9 +108,18 @@ class LinearFit:
             self.places,
             np.concatenate([np.zeros((len(columns), 0)), *inexact], axis=1),
             varied,
-            linear=not free.shape[1] and not held.any(),
+            linear=not free.shape[1],
             possible={name: problem.possible(term.candidate) for name, term in self.terms.items()},
         )
+
+    def covariance_by(self, found: Evidence) -> Array:
+        """Covariance of all unknowns, by the evidence; what stands at a bound may move.
+
+        `found`: of this fit.
+        """
+        if self.problem.held(self).any():
+            found = replace(found, point=self.whole)
+        return found.covariance
 
 
 class LinearProblem:

@@ -268,7 +268,7 @@ def _values(state: State, name: str) -> dict[str, tuple[float, float]]:
     fit: LinearFit = state.fit
     _, values = predicted_set(fit, state.evidence, 1.0).effects[name]
     term, sizes = fit.terms[name], fit.problem.sizes[name]
-    sigma = np.sqrt(np.diag(state.evidence.covariance))
+    sigma = np.sqrt(np.diag(fit.covariance_by(state.evidence)))
     own = sigma[fit.places[name]] * sizes
     found = {
         parameter.name: (float(value), float(error))
