@@ -153,7 +153,7 @@ def diagnose(
         standings(search, reading),
         _not_excited(problem, search),
         scope="another session" if aside.any() else "a part of this session",
-        complete=search.in_time,
+        ended=search.ended,
         predictor=Predictor(_sets(search, refused), candidates, nuisances),
         search=search,
         lost=tuple(np.flatnonzero(away).tolist()),
