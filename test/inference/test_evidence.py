@@ -185,7 +185,7 @@ def test_the_evidence_is_the_integral_over_what_is_possible(rng, size, possible)
     at = at.moved(np.linalg.lstsq(columns, left)[0])
     ground, one = Background((), 0.2), np.zeros(0)
     without = Evidence(Point(left, empty, np.zeros(0), np.zeros(0), {}, empty), ground, one, 1.0)
-    grid = np.linspace(-12.0, 12.0, 1201)
+    grid = np.linspace(-12.0, 12.0, 301)
     z = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
     within = ((z >= possible.lower) & (z <= possible.upper)).all(axis=1)
     if possible.together is not None:
