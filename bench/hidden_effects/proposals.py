@@ -179,7 +179,6 @@ def process(fit: WristFit, ground: Background, rows: Array) -> Array:
         left=fit.point.left[seen],
         columns=fit.point.columns[seen],
         inexact=fit.point.inexact[seen],
-        _beside={},
     )
     found = evidence(point, Background(groups, ground.noise_width))
     there = ground.part(found.background.numbers or range(len(groups)))

@@ -8,6 +8,7 @@ from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.inference.answer import Standing
+from wrist_stiffness.inference.search import MANY_FITS, TIME_OVER
 from wrist_stiffness.report.diagnosis_report import (
     absorbed_lines,
     class_of,
@@ -70,16 +71,20 @@ def test_unknown_is_an_error_without_a_name_or_a_name_without_an_answer(depends_
     assert verdict_lines(answer("unknown", (), depends_on))[0] == words
 
 
-def test_a_search_that_was_stopped_does_not_say_that_nothing_explains_it():
+@pytest.mark.parametrize(
+    ("ended", "words", "advice"),
+    [
+        (TIME_OVER, "The time was over", " Allow more --seconds."),
+        (MANY_FITS, "The limit of fits was reached", ""),
+    ],
+)
+def test_a_search_that_was_stopped_does_not_say_that_nothing_explains_it(ended, words, advice):
     left = [Standing("creep@joint_1", 0.0, gain, False, "") for gain in (0.5,)]
     left += [Standing("backlash@motor_1", 0.0, 40.0, False, "")]
-    stopped = replace(
-        answer("unknown", (), {"the pose": 1.0}), standings=tuple(left), complete=False
-    )
+    stopped = replace(answer("unknown", (), {"the pose": 1.0}), standings=tuple(left), ended=ended)
     first, rest = verdict_lines(stopped)
     assert first == (
-        "The time was over before every candidate was fitted; most promising: backlash@motor_1. "
-        "Allow more --seconds."
+        f"{words} before every candidate was fitted; most promising: backlash@motor_1.{advice}"
     )
     assert "depends on the pose" in rest
 

@@ -13,7 +13,8 @@ from wrist_stiffness.comparing.explained import explain
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.comparing.set_up import without_set_up
 from wrist_stiffness.identification.calibration import calibrate
-from wrist_stiffness.identification.likelihood import KNOWN, SURE_OF_NOISE
+from wrist_stiffness.inference.evidence import SURE_OF_NOISE
+from wrist_stiffness.inference.noise import KNOWN
 from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings

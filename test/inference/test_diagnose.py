@@ -13,6 +13,7 @@ from wrist_stiffness.inference import (
     Nuisance,
     Observations,
     Parameter,
+    Quantity,
     ShapeParameter,
     diagnose,
     load_predictor,
@@ -119,11 +120,36 @@ def test_what_cannot_be_told_apart_shares_a_class(rng):
     assert finding.probability >= 0.95
 
 
+@pytest.mark.parametrize("size", [3e3, 1e4, 1e6])
+def test_parameters_that_the_data_cannot_separate_share_what_they_do(rng, size):
+    """One weight at one place: its moment is as much larger or smaller as its force."""
+
+    def columns(table, shape):
+        return table.covariate("x")[:, None, None] * [1.0, 0.5]
+
+    spring = Candidate("spring", "part", (Parameter("per_N"), Parameter("per_Nm")), columns)
+    x = rng.uniform(-1.0, 1.0, 80)
+    units = Observations((size * x + rng.normal(size=80))[:, None], {"x": x}, np.eye(1))
+    (finding,) = diagnose(units, (spring,)).findings
+    (force, error), (moment, _) = (finding.parameters[name] for name in ("per_N", "per_Nm"))
+    assert force + 0.5 * moment == pytest.approx(size, rel=2e-3)
+    assert error > 0.3 * size
+
+
 def test_a_shape_is_found_between_the_points_of_its_grid(rng):
     result = diagnose(planted(table(rng, 150), (WAVE, 5.0, 5.2)), LAWS, (ZERO,))
     (finding,) = result.findings
     value, error = finding.parameters["k"]
     assert abs(value - 5.2) < 4.0 * error < 0.6
+
+
+def test_a_shape_is_that_of_the_data_however_much_larger_than_usual_the_effect_is(rng):
+    power = law(
+        "power", lambda c, p: c["t"] ** p, (ShapeParameter("p", (0.5, 1.0, 1.5, 2.5, 4.0)),)
+    )
+    units = Observations(rng.normal(size=(150, 2)), {"t": np.linspace(0.0, 1.0, 150)}, NOISE)
+    (finding,) = diagnose(planted(units, (power, 200.0, 2.0)), (power,), (ZERO,)).findings
+    assert finding.parameters["p"][0] == pytest.approx(2.0, abs=0.03)
 
 
 def test_an_impossible_sign_is_not_named(rng):
@@ -149,6 +175,39 @@ def test_what_stands_at_a_bound_leaves_the_rest_to_the_others(rng):
     assert finding.parameters["other"][0] == 0.0
 
 
+def test_what_stands_at_a_bound_is_known_as_well_as_the_data_know_it(rng):
+    def columns(table, shape):
+        x, z = table.covariate("x"), table.covariate("z")
+        return np.stack([x, x + 0.5 * z], axis=1)[:, None, :]
+
+    sizes = Parameter("one", 0.0, plausible=3.0), Parameter("other", 0.0, plausible=3000.0)
+    both = Candidate("spring", "pair", sizes, columns)
+    x, z = rng.uniform(-1.0, 1.0, (2, 300))
+    values = 8.0 * x - z + rng.normal(size=300)
+    units = Observations(values[:, None], {"x": x, "z": z}, np.eye(1))
+    (finding,) = diagnose(units, (both,)).findings
+    value, error = finding.parameters["other"]
+    assert value == 0.0
+    # It is what z leaves, 2 over the root of 100, beside a scatter that the bound enlarges.
+    assert 0.2 < error < 0.4
+
+
+def test_what_is_at_its_most_explains_what_it_can(rng):
+    stop = Candidate(
+        "stop",
+        "part",
+        (Parameter("size", 0.0, 5.0, plausible=3.0),),
+        lambda table, shape: table.covariate("x")[:, None, None],
+    )
+    x = rng.uniform(-1.0, 1.0, 100)
+    units = Observations((5.2 * x + rng.normal(size=100))[:, None], {"x": x}, np.eye(1))
+    result = diagnose(units, (stop,))
+    (standing,) = result.standings
+    assert standing.log_gain > 5.0
+    (finding,) = result.findings
+    assert finding.parameters["size"][0] == 5.0
+
+
 def test_an_effect_outside_the_catalogue_is_unknown_and_told_by_its_condition(rng):
     outside = law("ripple", lambda c: np.cos(5.0 * c["z"]))
     result = diagnose(planted(table(rng, 150), (outside, 4.0)), (LINEAR, SQUARE), (ZERO,))
@@ -156,6 +215,18 @@ def test_an_effect_outside_the_catalogue_is_unknown_and_told_by_its_condition(rn
     assert result.findings == ()
     assert next(iter(result.depends_on)) == "z"
     assert result.discrepancy["value_si"] > 1.0
+
+
+def test_what_no_law_explains_is_told_of_the_quantity_that_has_it(rng):
+    each = Quantity("first", "um", (0,)), Quantity("second", "um", (1,))
+    units = table(rng, 200, quantities=each)
+    beyond = 8.0 * np.sin(6.0 * units.covariates["x"])
+    values = units.values + beyond[:, None] * [0.0, 1.0]
+    result = diagnose(units.with_values(values), (SIGN,), (ZERO,))
+    assert result.verdict == "unknown"
+    assert result.discrepancy["first_um"] == 0.0
+    unexplained = float(np.sqrt(np.mean(beyond**2)))
+    assert result.discrepancy["second_um"] == pytest.approx(unexplained, rel=0.1)
 
 
 def test_drift_of_the_instrument_is_not_named_and_only_where_rows_have_an_order():
@@ -220,6 +291,27 @@ def test_repeated_conditions_fix_a_noise_that_is_not_told(rng):
     assert result.verdict == "unknown"
     assert result.noise["value_si"] == pytest.approx(np.sqrt(2.0), rel=0.35)
     assert result.discrepancy["value_si"] > 2.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_that_nothing_tells_is_found_far_below_what_a_rough_model_leaves(seed):
+    """Thirty waves for sixty numbers: the rough model can hold no more than a few of them."""
+    rng = np.random.default_rng(seed)
+    speeds, phases = rng.uniform(5, 60, 30), rng.uniform(0, 6, 30)
+    units = Observations(rng.normal(size=(60, 1)), {"x": rng.uniform(-1, 1, 60)})
+
+    def wave(n):
+        def columns(table, shape):
+            return np.sin(speeds[n] * table.covariate("x") + phases[n])[:, None, None]
+
+        return Candidate(f"wave {n}", "part", (Parameter("size"),), columns)
+
+    waves = [wave(n) for n in range(30)]
+    truth = zip(waves, (20.0, -15.0, 10.0), strict=False)
+    values = units.values + sum(size * each.evaluate(units, ())[:, :, 0] for each, size in truth)
+    result = diagnose(units.with_values(values), waves, ordered=False)
+    assert named(result) == {f"wave {n}@part" for n in range(3)}
+    assert result.noise["value_si"] == pytest.approx(1.0, rel=0.25)
 
 
 def test_ten_rows_of_nine_numbers_get_an_answer(rng):

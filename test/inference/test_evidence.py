@@ -7,11 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
-from scipy.stats import multivariate_normal, multivariate_t
+from scipy.stats import halfnorm, multivariate_normal, multivariate_t, norm
 from scipy.stats import t as student_t
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.evidence import Evidence, log_size_prior
+from wrist_stiffness.inference.evidence import (
+    MISFIT,
+    MOST_MISFIT,
+    Evidence,
+    log_excess,
+    log_size_prior,
+    modes,
+)
 from wrist_stiffness.inference.point import Background, Group, Point
 from wrist_stiffness.inference.possible import TAIL, Possible
 
@@ -104,6 +111,20 @@ def test_where_an_effect_acts_is_priced_as_a_tolerance_however_large_it_is(rng):
     assert one.cost(place) == pytest.approx(other.cost(tolerance))
 
 
+def test_no_product_of_other_columns_is_kept(rng):
+    point, ground = linear(rng)
+    at = Evidence(point, ground, np.array([0.5, 1.0]), 1.0)
+    assert at.log == Evidence(point.moved(np.zeros(2)), ground, at.amplitude, 1.0).log
+    for change in ({"columns": 2.0 * point.columns}, {"inexact": 2.0 * point.inexact}):
+        other = {n: getattr(point, n) for n in ("left", "columns", "z", "weight", "effects")}
+        fresh = Point(**{**other, "inexact": point.inexact, "linear": True, **change})
+        assert replace(at, point=replace(point, **change)).log == replace(at, point=fresh).log
+    groups = tuple(replace(each, columns=2.0 * each.columns) for each in ground.groups)
+    part, fresh = replace(ground, groups=groups), Background(groups, 0.2)
+    assert ground.part([0]).gram.any()
+    assert np.array_equal(part.part([0]).gram, fresh.part([0]).gram)
+
+
 @pytest.mark.parametrize("size", [0.0, 3.0, 30.0])
 def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size):
     column = rng.normal(size=(ROWS, 1))
@@ -126,6 +147,16 @@ def test_the_evidence_of_an_effect_is_near_the_integral_over_its_size(rng, size)
     assert gain == pytest.approx(exact, abs=0.1)
     first_order = Evidence(without, mute, one, 1.0).gains([-column])[0][0]
     assert first_order == pytest.approx(exact, abs=0.1)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e4, 1e8])
+def test_unknowns_that_do_the_same_gain_what_one_does(rng, size):
+    column = size * rng.normal(size=ROWS)
+    columns = column[:, None] * [1.0, 0.5]
+    left = 3.0 * column + rng.normal(size=ROWS)
+    (gain,), (z,), _ = modes((columns.T @ columns)[None], (columns.T @ left)[None])
+    assert z @ [1.0, 0.5] == pytest.approx(left @ column / (column @ column), rel=0.05)
+    assert gain == pytest.approx(0.5 * (left @ column) ** 2 / (column @ column), rel=0.3)
 
 
 def test_what_cannot_be_explains_nothing(rng):
@@ -154,7 +185,7 @@ def test_the_evidence_is_the_integral_over_what_is_possible(rng, size, possible)
     at = at.moved(np.linalg.lstsq(columns, left)[0])
     ground, one = Background((), 0.2), np.zeros(0)
     without = Evidence(Point(left, empty, np.zeros(0), np.zeros(0), {}, empty), ground, one, 1.0)
-    grid = np.linspace(-12.0, 12.0, 1201)
+    grid = np.linspace(-12.0, 12.0, 301)
     z = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
     within = ((z >= possible.lower) & (z <= possible.upper)).all(axis=1)
     if possible.together is not None:
@@ -185,9 +216,7 @@ def test_what_a_law_may_be_wrong_by_is_no_sign_of_an_imitation(rng):
     varied = 9.0 * point.columns * rng.normal(size=(ROWS, 2))
     point = replace(point, left=point.left + 3.0 * varied[:, 0], varied={"a": varied})
     exact, nearly, hardly = (
-        Evidence(
-            replace(point, inexact=share * varied, _beside={}), ground, np.full(2, 0.5), 0.1
-        ).rest("a")
+        Evidence(replace(point, inexact=share * varied), ground, np.full(2, 0.5), 0.1).rest("a")
         for share in (0.0, 1.0, 100.0)
     )
     assert exact > 2.0 * nearly > 0.0
@@ -217,14 +246,24 @@ def test_an_effect_that_the_set_up_nearly_takes_up_counts_by_what_is_seen_of_it(
         assert at.rest("a") == pytest.approx(expected, rel=1e-2)
 
 
+@pytest.mark.parametrize("width", [0.2, 3.0])
+def test_noise_far_below_the_known_one_has_a_prior(width):
+    x = np.array([-20.0, -2.0, -0.5, 0.1, 1.0, 3.0])
+    found = log_excess(np.exp(x), width)
+    known = (1.0 - MISFIT) * norm(0.0, width).pdf(x)
+    expected = known + MISFIT * halfnorm(0.0, MOST_MISFIT).pdf(x)
+    assert found[1:] == pytest.approx(np.log(expected[1:]))
+    assert found[0] == pytest.approx(np.log(1.0 - MISFIT) + norm(0.0, width).logpdf(x[0]))
+
+
 def test_what_is_attainable_is_the_evidence_of_noise_alone(rng):
     point, ground = linear(rng, columns=2)
     drift = ground.part(ground.always)
     everything = np.hstack([point.columns, point.inexact, drift.columns])
     noise = rng.normal(size=ROWS)
     noise -= everything @ np.linalg.lstsq(everything, noise, rcond=None)[0]
-    alone = replace(point, left=noise * np.sqrt(ROWS) / np.linalg.norm(noise), _beside={})
+    alone = replace(point, left=noise * np.sqrt(ROWS) / np.linalg.norm(noise))
     best = Evidence(alone, drift, np.array([0.5]), 1.0)
     assert best.attainable == pytest.approx(best.log, abs=1e-9)
-    at = Evidence(replace(point, left=20.0 * point.left, _beside={}), ground, np.full(2, 3.0), 2.0)
+    at = Evidence(replace(point, left=20.0 * point.left), ground, np.full(2, 3.0), 2.0)
     assert at.attainable == pytest.approx(best.log, abs=1e-9)

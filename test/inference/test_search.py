@@ -9,7 +9,7 @@ from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.answer import probabilities, read, standings
 from wrist_stiffness.inference.point import Background, Group, Point
 from wrist_stiffness.inference.possible import Possible
-from wrist_stiffness.inference.search import LEADERS, Search, Trial
+from wrist_stiffness.inference.search import LEADERS, MANY_FITS, TIME_OVER, Search, Trial
 
 ROWS, CANDIDATES = 60, LEADERS + 4
 
@@ -258,3 +258,15 @@ def test_in_place_of_an_effect_only_what_may_regain_half_of_it_is_asked(rng):
     assert "weak_0@place" in {name for names, name in problem.asked if not names}
     beside_second = {n for names, n in problem.asked if names == {"cause@second"}}
     assert beside_second == {"rival@place"}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "fits", "ended"), [(0.0, 48, TIME_OVER), (np.inf, 1, MANY_FITS), (np.inf, 48, "")]
+)
+def test_what_ended_a_search_is_told(rng, monkeypatch, seconds, fits, ended):
+    monkeypatch.setattr("wrist_stiffness.inference.search.MOST_FITS", fits)
+    search = Search(Disappointing(rng, 0.8), seconds, most_effects=1)
+    search.run()
+    assert search.ended == ended
+    why = {each.why_not for each in standings(search, read(search))}
+    assert (f"was not fitted: {ended}" in why) == bool(ended)

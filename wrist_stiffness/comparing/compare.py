@@ -22,7 +22,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
 from wrist_stiffness.identification.free_effects import answering_as
 from wrist_stiffness.inference import Observations
-from wrist_stiffness.inference.noise import replicate_variance
+from wrist_stiffness.inference.noise import FEWEST_REPEATS, replicate_variance
 from wrist_stiffness.inference.outliers import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
@@ -36,9 +36,6 @@ Prepared = tuple[Observed, Explained, tuple[str, ...]]
 VERY_STRONG = 5.0
 """Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
 """
-
-FEWEST_REPEATS = 6
-"""Degrees of freedom from which a repeatability is told."""
 
 
 def compare_models(

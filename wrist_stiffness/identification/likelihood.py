@@ -15,6 +15,7 @@ from wrist_stiffness.identification.questions import (
     smooth_columns,
 )
 from wrist_stiffness.inference.discrepancy import (
+    DRIFT,
     PASSING,
     SLOW_DRIFT,
     Question,
@@ -23,27 +24,13 @@ from wrist_stiffness.inference.discrepancy import (
     unresolved,
 )
 from wrist_stiffness.inference.evidence import Evidence
-from wrist_stiffness.inference.noise import unstated
+from wrist_stiffness.inference.noise import KNOWN, unstated
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.projection import low_rank
-from wrist_stiffness.inference.shared import Whitened, own_covariance
+from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance
 from wrist_stiffness.inference.smooth import by_session
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.sessions.unit_session import UnitSession
-
-DRIFT = 0.5
-"""Expected size of an instrument's slow drift where it states none, in scatters of one
-measurement (assumed)."""
-
-KNOWN, UNKNOWN = 0.2, 3.0
-"""Standard deviation of the logarithm of the noise's variance where an instrument or dwells tell
-it, and where nothing does (assumed)."""
-
-SURE_OF_NOISE = 3.0
-"""Widths by which noise may be more than is known of it; beyond, it is a misfit."""
-
-LAW_RANK = 8
-"""Columns of the error of one law."""
 
 
 def likelihood_of(base: BaseFit, lost: int = 0) -> WristTable:
@@ -79,13 +66,12 @@ class WristTable(Whitened):
         )
         if left.covariance is None:
             base = columns if left.common is None else np.concatenate([columns, left.common], 2)
-            usual, width = unstated(left, base, smooth_columns(left), KNOWN, UNKNOWN)
+            usual, width = unstated(left, base, smooth_columns(left))
             own = own_covariance(left, np.diag(usual))
         else:
             # A drift that is stated has columns of its own.
             own = own_covariance(left, left.covariance) - slow[:, :, None] ** 2 * each_its_own
             width = KNOWN
-        self._noise_width = width
         variance: Array = np.diagonal(own, axis1=1, axis2=2)
         self._scatter = variance
         if left.shared is not None and left.stand is not None:
@@ -100,7 +86,7 @@ class WristTable(Whitened):
         # What the columns of a drift cannot follow is scatter of each unit by itself.
         beyond = unresolved(wander) + PASSING**2 * unresolved(short)
         own = own + (beyond[:, None] * self.drift**2)[:, :, None] * each_its_own
-        self.variance: Array = np.diagonal(own, axis1=1, axis2=2)
+        self.variance = np.diagonal(own, axis1=1, axis2=2)
         super().__init__(left, own, low_rank(alike(left.covariates), LAW_RANK)[0])
         asked, usual = ask(left.covariates), np.sqrt(np.median(self.variance, axis=0))
         self.background = background(self, asked, usual, width, self.drift, wander, short)
@@ -121,14 +107,4 @@ class WristTable(Whitened):
 
     def _scatter_of(self, found: Evidence) -> Array:
         """Variance of each unit by noise, as far as the excess is no misfit."""
-        known = np.log(found.excess) <= SURE_OF_NOISE * self._noise_width
-        return self._scatter * (found.excess if known else 1.0)
-
-    def above(self, found: Evidence) -> dict[str, float]:
-        """Return what is left above that noise, RMS by quantity."""
-        own = np.zeros_like(self.variance)
-        for quantity in self.observations.quantities:
-            at = list(quantity.components)
-            count = max(int(self.observations.measured[:, at].sum()), 1)
-            own[:, at] = self.variance[:, at] * found.left_of(quantity.name, count)
-        return self.observations.rms(own)
+        return self._scatter * found.noise

@@ -32,7 +32,7 @@ from wrist_stiffness.inference.answer import (
 from wrist_stiffness.inference.giving import told
 from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Observations
-from wrist_stiffness.inference.search import Search, State
+from wrist_stiffness.inference.search import TIME_OVER, Search, State
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -133,7 +133,7 @@ def diagnose_sessions(
         # What the held-out part speaks against is not handed over.
         judge.after, reading = judge.before, _settled(reading.refute(search.base))
     proposals = None
-    if search.in_time and (reading.verdict == "unknown" or reading.depends_on):
+    if search.ended != TIME_OVER and (reading.verdict == "unknown" or reading.depends_on):
         proposals = propose(problem, reading.state.fit, naming, tell)
     state = reading.state
     absorbed = taken_up(state.fit.base, [session.name for session in sessions])
@@ -158,10 +158,10 @@ def diagnose_sessions(
         _not_excited(search),
         tuple(each.sentence for each in absorbed),
         judge.scope,
-        complete=search.in_time,
+        ended=search.ended,
     )
     # Tolerances that give way to an unknown law, or one not asked yet, say nothing of the drawing.
-    told = bool(proposals and proposals.terms) or not search.in_time
+    told = bool(proposals and proposals.terms) or search.ended == TIME_OVER
     tense = None if told else strain(state.fit)
     beyond = state.fit.base.beyond()
     effects = tuple(beyond[each.name] for each in reading.named)

@@ -143,7 +143,7 @@ class WristFit:
         held &= ~self.base.of_base
         if not held.any():
             return self.whole
-        return replace(self.whole, columns=self.whole.columns * ~held, _beside={})
+        return replace(self.whole, columns=self.whole.columns * ~held)
 
     @cached_property
     def whole(self) -> Point:
@@ -202,7 +202,6 @@ class WristFit:
             inexact=np.delete(point.inexact, wrong, axis=1),
             varied={n: own for n, own in point.varied.items() if n != name},
             sizing={n: np.searchsorted(kept, own) for n, own in point.sizing.items()},
-            _beside={},
         )
 
     @cached_property

@@ -30,7 +30,7 @@ MOST_STEPS, ENOUGH = 15, 0.1
 FURTHEST, MOST_HALVINGS = 1.5, 5
 """Longest step of the logarithm of an amplitude, and how often one that gains nothing is halved."""
 
-LOG_EXCESS = np.linspace(-0.7, 16.0, 1600)
+LOG_EXCESS = np.linspace(-9.0, 16.0, 2400)
 """Logarithms of the excess among which the best is sought."""
 
 

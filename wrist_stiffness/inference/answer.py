@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wrist_stiffness.inference.point import EXPECTED, OUTSIDE
-from wrist_stiffness.inference.search import NEGLIGIBLE, Names, Search, State
+from wrist_stiffness.inference.search import NEGLIGIBLE, Ended, Names, Search, State
 
 SCHEMA = 2
 
@@ -288,8 +288,8 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
             why = AS_MUCH
         if name in refuted:
             why = GROWS
-        if name not in fitted and gain >= CHANCE and not search.in_time:
-            why = "was not fitted: the time was over"
+        if name not in fitted and gain >= CHANCE and search.ended:
+            why = f"was not fitted: {search.ended}"
         found.append(Standing(name, probability, gain, name in fitted, why))
     return tuple(sorted(found, key=lambda each: (-each.probability, -each.log_gain)))
 
@@ -412,8 +412,9 @@ class Diagnosis:
         What calibration took up, largest first.
     scope : str
         What the held-out units are.
-    complete : bool
-        Whether every candidate worth a fit was fitted; if not, more time may change the answer.
+    ended : str
+        What ended the search before every candidate worth a fit was fitted: "the time was over", or
+        "the limit of fits was reached"; empty where nothing did.
     """
 
     verdict: Verdict
@@ -430,7 +431,12 @@ class Diagnosis:
     not_excited: tuple[NotExcited, ...]
     absorbed: tuple[str, ...] = ()
     scope: str = ""
-    complete: bool = True
+    ended: Ended = ""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every candidate worth a fit was fitted; else more may change the answer."""
+        return not self.ended
 
     @property
     def promising(self) -> tuple[Standing, ...]:
@@ -450,6 +456,7 @@ class Diagnosis:
             "schema": SCHEMA,
             "verdict": self.verdict,
             "complete": self.complete,
+            "ended": self.ended,
             "probability": self.probability,
             "scope": self.scope,
             "noise": dict(self.noise),

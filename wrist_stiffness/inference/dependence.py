@@ -114,9 +114,8 @@ def _summed_up(point: Point, background: Background) -> tuple[Point, Background]
         columns=rows[:, :named],
         inexact=np.zeros((len(rows), 0)),
         numbers=point.count,
-        _beside={},
     )
-    return summed, replace(background, groups=groups, _parts={})
+    return summed, replace(background, groups=groups)
 
 
 class _Sets:

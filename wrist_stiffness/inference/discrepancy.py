@@ -18,6 +18,10 @@ from wrist_stiffness.inference.projection import low_rank
 from wrist_stiffness.inference.shared import Whitened
 from wrist_stiffness.inference.smooth import Smooth
 
+DRIFT = 0.5
+"""Expected size of an instrument's slow drift where it states none, in scatters of one
+measurement (assumed)."""
+
 DRIFT_S = (20.0, 200.0)
 """Correlation times of an instrument's slow drift, half of its variance each [s] (assumed)."""
 

@@ -26,7 +26,7 @@ from scipy.special import gammaln
 
 from wrist_stiffness.inference.giving import SPREAD, Give
 from wrist_stiffness.inference.point import Background, Group, Point
-from wrist_stiffness.inference.possible import TAIL, Possible
+from wrist_stiffness.inference.possible import TAIL, Possible, within_bounds
 from wrist_stiffness.inference.projection import NEGLIGIBLE
 
 Array = NDArray[np.float64]
@@ -37,9 +37,16 @@ MISFIT = 0.05
 MOST_MISFIT = 3.0
 """Standard deviation of the logarithm of that excess variance (assumed)."""
 
+SURE_OF_NOISE = 3.0
+"""Widths by which noise may be more than is known of it; beyond, it is a misfit."""
+
 SURPRISE = 2.0
 """Standard deviations of the logarithm of a drift's amplitude that no instrument reaches, but one
 of 40."""
+
+LEAST_PRIOR = 1e-12
+"""Least precision of a prior as a share of the information: what the data cannot tell apart stays
+solvable in the rounding of numbers."""
 
 OFF = 1e-3
 """Amplitude of a group that is absent, in scatters of a unit."""
@@ -307,10 +314,15 @@ class Evidence:
         return smooth * share / count + self.misfit
 
     @property
+    def noise(self) -> float:
+        """Variance of the noise in units of the known one: the excess, where it is no misfit."""
+        known = SURE_OF_NOISE * self.background.noise_width
+        return self.excess if np.log(self.excess) <= known else 1.0
+
+    @property
     def misfit(self) -> float:
         """Excess of the scatter that no wrongly known noise explains."""
-        known = 3.0 * self.background.noise_width
-        return self.excess - 1.0 if np.log(self.excess) > known else 0.0
+        return self.excess - self.noise
 
     def rest(self, name: str) -> float:
         """Return how much of an effect is left in its own shape, 0 where its law is right.
@@ -425,14 +437,21 @@ def _gain(
     """
     if possible is None:
         return float(gain), z
-    free = np.ones(len(z), dtype=bool)
-    while (beyond := free & ((z < possible.lower) | (z > possible.upper))).any():
-        free &= ~beyond
-        z = np.clip(z, possible.lower, possible.upper)
+
+    def solve(free: NDArray[np.bool_], z: Array) -> Array:
+        nonlocal gain, precision
+        if not free.any():
+            gain = 0.0
+            return z
+        z, at = z.copy(), np.flatnonzero(free)
         rest = slope - information @ np.where(free, 0.0, z)
-        (gain,), (z[free],), (precision,) = modes(
-            information[np.ix_(free, free)][None], rest[None, free]
-        )
+        (gain,), (z[at],), (precision,) = modes(information[np.ix_(at, at)][None], rest[None, at])
+        return z
+
+    def inwards(z: Array) -> Array:
+        return np.asarray(slope - information @ z - size_weight(z @ z, len(z)) * z)
+
+    z, free = within_bounds(z, possible.lower, possible.upper, solve, inwards)
     if not free.any():
         # What stays at its bounds keeps its prior: data that say no more are no evidence.
         return gain + float(slope @ z - 0.5 * z @ information @ z), z
@@ -453,8 +472,10 @@ def modes(information: Array, slope: Array) -> tuple[Array, Array, Array]:
     """
     count = slope.shape[1]
     found = []
+    least = LEAST_PRIOR * information.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0)
     for weight in (np.full(len(slope), 1.0), np.full(len(slope), 1e-8)):
         for _ in range(5):
+            weight = np.maximum(weight, least)
             whole = information + weight[:, None, None] * np.eye(count)
             z = np.asarray(np.linalg.solve(whole, slope[..., None])[..., 0], dtype=np.float64)
             square = _dots(z, z)
@@ -478,7 +499,7 @@ def _dots(one: Array, other: Array) -> Array:
 def known_noise(point: Point, background: Background) -> Evidence:
     """Return a fitted set beside noise and drift as they are known; laws give, nothing else."""
     own = np.arange(point.inexact.shape[1]) < len(point.gives)
-    exact = replace(point, inexact=np.where(own, 1.0, OFF) * point.inexact, _beside={})
+    exact = replace(point, inexact=np.where(own, 1.0, OFF) * point.inexact)
     return beside_known(exact, background)
 
 
@@ -501,6 +522,8 @@ def log_amplitude(size: float, group: Group, count: int) -> float:
 def log_excess(excess: Array, width: float) -> Array:
     """Return the log prior of the excess: the noise as known, or something unknown beside it."""
     x = np.log(excess)
-    known = np.exp(-0.5 * (x / width) ** 2) / width
-    other = np.where(x > 0.0, 2.0 * np.exp(-0.5 * (x / MOST_MISFIT) ** 2) / MOST_MISFIT, 0.0)
-    return np.asarray(np.log(((1.0 - MISFIT) * known + MISFIT * other) / np.sqrt(2.0 * np.pi)))
+    known = np.log((1.0 - MISFIT) / width) - 0.5 * (x / width) ** 2
+    other = np.log(2.0 * MISFIT / MOST_MISFIT) - 0.5 * (x / MOST_MISFIT) ** 2
+    # Logarithms throughout: far below 1 no density would be left.
+    both = np.logaddexp(known, np.where(x > 0.0, other, -np.inf))
+    return np.asarray(both - 0.5 * np.log(2.0 * np.pi))

@@ -1,10 +1,10 @@
-"""The sealed part: put aside before looking, opened when the search is over.
+"""The held-out part: it names nothing and only takes away.
 
-It names nothing and only takes away.  Whenever an effect goes, those that are left are judged by it
-again, for they are fitted anew.
+Of several sessions it is the last one, put aside before looking and opened when the search is over:
+inside a session a badly excited parameter improves every cross-validation and fails the day after.
 
-Held out means another session where there is one: inside a session a badly excited parameter
-improves every cross-validation and fails the day after.
+Of one session it is a part, without which what was found is fitted anew.  All of the session chose
+the effects, this part too: it judges their values, and hardly whether they are the right ones.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ HELD_OUT = 0.2
 """Part of the units that judges where there is one session only (assumed)."""
 
 JUDGES = 8
-"""Blocks of the sealed part from which the uncertainty of a gain is taken."""
+"""Blocks of the held-out part from which the uncertainty of a gain is taken."""
 
 
 def time_blocks(sessions: Labels, wanted: int) -> Labels:
@@ -75,7 +75,7 @@ class HeldOut:
 
 
 def refuted(before: HeldOut, after: HeldOut) -> bool:
-    """Whether an effect makes sealed units worse by more than chance explains.
+    """Whether an effect makes held-out units worse by more than chance explains.
 
     The change f of the prediction gains 2 r f - f^2; with a right f its standard deviation is
     2 |f|, so a loss beyond twice that is none of a right effect.

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,11 @@ from wrist_stiffness.inference.candidates import (
     Nuisance,
     nuisance_columns,
 )
-from wrist_stiffness.inference.evidence import size_weight
+from wrist_stiffness.inference.evidence import LEAST_PRIOR, Evidence, log_size_prior, size_weight
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.point import Background, Point
-from wrist_stiffness.inference.possible import Possible
+from wrist_stiffness.inference.possible import Possible, within_bounds
 from wrist_stiffness.inference.projection import SQUARED_ROUNDING
 from wrist_stiffness.inference.search import Ranked, Trial
 
@@ -65,6 +64,16 @@ class LinearFit:
             first += len(term.candidate.parameters)
         return found
 
+    @property
+    def cost(self) -> float:
+        """Minus twice the log posterior, up to what all fits to the table share."""
+        columns = self.problem.columns(tuple(self.terms.values()))
+        left, base = self.problem.white - columns @ self.z, self.z[: self.problem.n_nuisances]
+        found = float(left @ left + base @ base)
+        for places in self.places.values():
+            found -= 2.0 * float(log_size_prior(np.sum(self.z[places] ** 2), len(places)))
+        return found
+
     def change(self, name: str) -> Array:
         """Return what an effect of the set does to the observations, (n, m)."""
         term = self.terms[name]
@@ -73,6 +82,15 @@ class LinearFit:
 
     @cached_property
     def point(self) -> Point:
+        """Where the fit ended, as the evidence takes it: what stands at a bound stays there."""
+        held, whole = self.problem.held(self), self.whole
+        if not held.any():
+            return whole
+        moves = np.concatenate([~held, np.ones(len(whole.z) - len(held), dtype=bool)])
+        return replace(whole, columns=whole.columns * moves, linear=False)
+
+    @cached_property
+    def whole(self) -> Point:
         """Where the fit ended, whitened."""
         problem, table = self.problem, self.problem.table
         columns = problem.columns(tuple(self.terms.values()))
@@ -82,8 +100,6 @@ class LinearFit:
         bent = [problem.tangents(self, name) for name in self.terms]
         free = np.concatenate([np.zeros((len(columns), 0)), *bent], axis=1)
         p = columns.shape[1]
-        held = problem.held(self)
-        columns = columns * ~held
         return Point(
             problem.white - columns @ self.z,
             np.concatenate([-columns, -free], axis=1),
@@ -92,9 +108,18 @@ class LinearFit:
             self.places,
             np.concatenate([np.zeros((len(columns), 0)), *inexact], axis=1),
             varied,
-            linear=not free.shape[1] and not held.any(),
+            linear=not free.shape[1],
             possible={name: problem.possible(term.candidate) for name, term in self.terms.items()},
         )
+
+    def covariance_by(self, found: Evidence) -> Array:
+        """Covariance of all unknowns, by the evidence; what stands at a bound may move.
+
+        `found`: of this fit.
+        """
+        if self.problem.held(self).any():
+            found = replace(found, point=self.whole)
+        return found.covariance
 
 
 class LinearProblem:
@@ -216,15 +241,15 @@ class LinearProblem:
         bare = LinearFit(self, terms, np.zeros(columns.shape[1]))
         gram, target = columns.T @ columns, columns.T @ self.white
         lower, upper = self._bounds(bare)
-        held = np.zeros(len(target), dtype=bool)
-        z = bare.z
-        for _ in range(len(target) + 1):
-            z = _solved(gram, target, bare.places, held, z)
-            beyond = ~held & ((z < lower) | (z > upper))
-            if not beyond.any():
-                break
-            held |= beyond
-            z = np.clip(z, lower, upper)
+
+        def solve(free: NDArray[np.bool_], z: Array) -> Array:
+            return _solved(gram, target, bare.places, free, z)
+
+        def slope(z: Array) -> Array:
+            return np.asarray(target - gram @ z - _weights(z, bare.places) * z)
+
+        z = solve(np.ones(len(target), dtype=bool), bare.z)
+        z, _ = within_bounds(z, lower, upper, solve, slope)
         return LinearFit(self, terms, z)
 
     def held(self, fit: LinearFit) -> NDArray[np.bool_]:
@@ -269,10 +294,9 @@ class LinearProblem:
 
         def cost(scaled: Array) -> float:
             shape = tuple((scaled * width).tolist())
-            found = self.fitted({**terms, name: Term(candidate, shape)})
-            left = self.white - self.columns(tuple(found.terms.values())) @ found.z
+            found = self.fitted({**terms, name: Term(candidate, shape)}).cost
             self._evaluated.pop((name, shape), None)
-            return float(left @ left + found.z @ found.z)
+            return found
 
         bounds = [(low / w, high / w) for (low, high), w in zip(limits, width, strict=True)]
         begin = np.array(start) / width
@@ -315,24 +339,32 @@ def _simplex(begin: Array, bounds: Sequence[tuple[float, float]]) -> Array:
 def _solved(
     gram: Array,
     target: Array,
-    effects: Mapping[str, Any],
-    held: NDArray[np.bool_],
+    effects: Mapping[str, NDArray[np.intp]],
+    free: NDArray[np.bool_],
     z: Array,
 ) -> Array:
-    """Return the most probable unknowns where those that are held stay, (p,)."""
-    z = np.where(held, z, 0.0)
+    """Return the most probable unknowns where those that are not free stay, (p,)."""
+    z = np.where(free, 0.0, z)
     if not len(target):
         return z
     # The tails of the priors first: a large effect is found from their side.
     weight = np.ones(len(target))
     for places in effects.values():
         weight[places] = 1e-8
-    free = np.flatnonzero(~held)
-    rest = target - gram[:, held] @ z[held]
+    rest = target - gram[:, ~free] @ z[~free]
+    at = np.flatnonzero(free)
     for _ in range(ROUNDS if effects else 1):
-        information = gram[np.ix_(free, free)] + np.diag(weight[free])
+        information = gram[np.ix_(at, at)] + np.diag(weight[at])
         scale = 1.0 / np.sqrt(np.diag(information))
-        z[free] = scale * np.linalg.solve(information * scale[:, None] * scale, scale * rest[free])
-        for places in effects.values():
-            weight[places] = size_weight(float(np.sum(z[places] ** 2)), len(places))
+        scaled = information * scale[:, None] * scale + LEAST_PRIOR * np.eye(len(at))
+        z[at] = scale * np.linalg.solve(scaled, scale * rest[at])
+        weight = _weights(z, effects)
     return z
+
+
+def _weights(z: Array, effects: Mapping[str, NDArray[np.intp]]) -> Array:
+    """Return the precisions of Gaussian priors with the slopes of those of the unknowns, (p,)."""
+    weight = np.ones(len(z))
+    for places in effects.values():
+        weight[places] = size_weight(float(np.sum(z[places] ** 2)), len(places))
+    return weight

@@ -7,6 +7,10 @@ import numpy as np
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.projection import ABSORBED, leading_directions, orthonormal
 
+KNOWN, UNKNOWN = 0.2, 3.0
+"""Standard deviation of the logarithm of the noise's variance where a table, an instrument or
+repeats tell it, and where nothing does (assumed)."""
+
 FEWEST_REPEATS = 6
 """Degrees of freedom from which repeated conditions tell the noise."""
 
@@ -75,19 +79,16 @@ def in_each_component(features: Sequence[Array | None], observations: Observatio
     return np.asarray(spread.reshape(*observations.values.shape, -1))
 
 
-def unstated(
-    observations: Observations, base: Array, structure: Array, known: float, unknown: float
-) -> tuple[Array, float]:
-    """Return the variance of a unit (m,) that nothing states, and how well it is known.
+def unstated(observations: Observations, base: Array, structure: Array) -> tuple[Array, float]:
+    """Return the variance of a unit (m,) that nothing states, and the width of its logarithm.
 
-    `observations`, `base`, `structure`: as for `scatter_of`; `known`, `unknown`: least standard
-    deviation of the logarithm of the variance where repeats tell it, and that where none do.
+    `observations`, `base`, `structure`: as for `scatter_of`.
     """
     variance, repeats = scatter_of(observations, base, structure)
     if not repeats:
-        return variance, unknown
+        return variance, UNKNOWN
     seen = observations.measured.any(axis=0).sum()
-    return variance, max(float(np.sqrt(2.0 / (repeats * seen))), known)
+    return variance, max(float(np.sqrt(2.0 / (repeats * seen))), KNOWN)
 
 
 def scatter_of(observations: Observations, base: Array, structure: Array) -> tuple[Array, float]:

@@ -24,19 +24,40 @@ LEAST = 1e-3
 MOST_DIRECTIONS = 0.25
 """Of the measured values: more directions would follow the noise of all of them."""
 
+ROUNDING = 1e-9
+"""Values that differ by less than this share of the largest are the same one."""
+
 RIDGE = 1e-9
 """Keeps a direction solvable that only lost units show."""
 
 
-def robust_scale(values: Array) -> Array:
-    """Robust standard deviation of each component, (m,); one where nothing was measured."""
-    scale = np.ones(values.shape[1])
+def robust_scale(values: Array, least: Array | float = 0.0) -> Array:
+    """Robust standard deviation of each component, (m,); one where there is none.
+
+    `values` (n, m): NaN = not measured; `least` (m,): it is at least that.
+    """
+    scale = np.zeros(values.shape[1])
     for component, column in enumerate(values.T):
         good = column[np.isfinite(column)]
         if good.size:
-            deviation = np.median(np.abs(good - np.median(good)))
-            scale[component] = MAD_TO_SIGMA * deviation if deviation > 0 else 1.0
-    return scale
+            scale[component] = MAD_TO_SIGMA * np.median(np.abs(good - np.median(good)))
+    scale = np.maximum(scale, least)
+    return np.where(scale > 0.0, scale, 1.0)
+
+
+def rounding(values: Array) -> Array:
+    """Return the standard deviation (m,) that coarse digits bring; 0 where all are alike.
+
+    Where most values are rounded to the same number, their deviations tell nothing of the scatter.
+    """
+    found = np.zeros(values.shape[1])
+    for component, column in enumerate(values.T):
+        each = np.unique(column[np.isfinite(column)])
+        steps = np.diff(each)
+        steps = steps[steps > ROUNDING * np.abs(each).max(initial=0.0)]
+        if steps.size:
+            found[component] = steps.min() / np.sqrt(12.0)
+    return found
 
 
 def lost_units(observations: Observations, columns: Array, limit: float) -> Mask:
@@ -51,7 +72,8 @@ def lost_units(observations: Observations, columns: Array, limit: float) -> Mask
     n, m = observations.values.shape
     measured = observations.measured
     values = np.where(measured, observations.values, 0.0)
-    size = robust_scale(observations.values)
+    least = rounding(observations.values)
+    size = robust_scale(observations.values, least)
     rows = np.where(measured[:, :, None], columns / size[:, None], 0.0).reshape(n * m, -1)
     basis = leading_directions(rows, int(MOST_DIRECTIONS * measured.sum()), LEAST)
     target = (values / size).reshape(-1)
@@ -62,7 +84,7 @@ def lost_units(observations: Observations, columns: Array, limit: float) -> Mask
         gram = weighted.T @ basis + RIDGE * np.eye(basis.shape[1])
         fit = basis @ np.linalg.solve(gram, weighted.T @ target)
         residual = np.where(measured, (target - fit).reshape(n, m), np.nan)
-        scaled = np.where(measured, residual / robust_scale(residual), 0.0)
+        scaled = np.where(measured, residual / robust_scale(residual, least / size), 0.0)
         distance = np.sqrt(np.sum(scaled**2, axis=1) / np.maximum(measured.sum(axis=1), 1))
         before, weight = weight, np.clip(1 - (distance / limit) ** 2, 0, None) ** 2
         if np.abs(weight - before).max() < SETTLED:

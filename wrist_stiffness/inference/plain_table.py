@@ -6,26 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from wrist_stiffness.inference.discrepancy import background, unresolved
-from wrist_stiffness.inference.noise import in_each_component, unstated
+from wrist_stiffness.inference.discrepancy import DRIFT, background, unresolved
+from wrist_stiffness.inference.noise import KNOWN, in_each_component, unstated
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.projection import orthonormal
-from wrist_stiffness.inference.shared import Whitened, own_covariance
+from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance
 from wrist_stiffness.inference.smooth import alike, by_session, questions, wander
-
-STATED, ESTIMATED = 0.2, 0.7
-"""Standard deviation of the logarithm of the noise's variance where the table states it, and where
-only what everything together leaves tells it (assumed)."""
-
-DRIFT = 0.5
-"""Expected size of an instrument's slow drift, in scatters of one unit (assumed)."""
 
 BEYOND = 0.03
 """Least part of a question that no name must be able to answer, or it is not asked."""
-
-LAW_RANK = 8
-"""Columns of the error of one law."""
 
 
 class Table(Whitened):
@@ -46,12 +36,10 @@ class Table(Whitened):
             asked = [each.features(observations.covariates) for each in self.questions]
             smooth = in_each_component([*asked, self._wander], observations)
             structure = np.concatenate([named, smooth], axis=2)
-            self.variance, self.noise_width = unstated(
-                observations, base, structure, STATED, ESTIMATED
-            )
+            self.variance, self.noise_width = unstated(observations, base, structure)
             stated = np.diag(self.variance)
         else:
-            stated, self.noise_width = observations.covariance, STATED
+            stated, self.noise_width = observations.covariance, KNOWN
             variances = np.atleast_2d(np.diagonal(stated, axis1=-2, axis2=-1))
             self.variance = np.median(variances, axis=0)
         own = own_covariance(observations, stated)

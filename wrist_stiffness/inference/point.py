@@ -59,7 +59,7 @@ class Background:
     asked: int = 0
     whole: Background | None = None  # of which it is a part
     numbers: tuple[int, ...] = ()  # places of its groups there
-    _parts: dict[tuple[int, ...], Background] = field(default_factory=dict, repr=False)
+    _parts: dict[tuple[int, ...], Background] = field(default_factory=dict, init=False, repr=False)
 
     def part(self, numbers: Iterable[int]) -> Background:
         """Return some of the groups, by their places; what is known of all serves them too."""
@@ -155,7 +155,7 @@ class Point:
     sizing: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
     # what the unknowns of each effect can be; anything where it is not told
     possible: Mapping[str, Possible] = field(default_factory=dict)
-    _beside: dict[str, Any] = field(default_factory=dict, repr=False)
+    _beside: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def sized(self) -> dict[str, NDArray[np.intp]]:
@@ -169,7 +169,10 @@ class Point:
 
     def moved(self, step: Array) -> Point:
         """Return the point a step (p,) further on, as the slopes tell."""
-        return replace(self, left=self.left + self.columns @ step, z=self.z + step)
+        found = replace(self, left=self.left + self.columns @ step, z=self.z + step)
+        # The columns are the same ones, and so are their products.
+        object.__setattr__(found, "_beside", self._beside)
+        return found
 
     def with_effect(
         self,
@@ -198,7 +201,6 @@ class Point:
             inexact=np.hstack([self.inexact, inexactness * varied]),
             varied={**self.varied, name: varied},
             linear=True,
-            _beside={},
         )
 
     def products(self, ground: Background, columns: Array) -> Array:

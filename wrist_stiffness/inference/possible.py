@@ -67,6 +67,41 @@ class Possible:
         return log - self.log_prior
 
 
+def within_bounds(
+    z: Array,
+    lower: Array,
+    upper: Array,
+    solve: Callable[[NDArray[np.bool_], Array], Array],
+    slope: Callable[[Array], Array],
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the most probable unknowns (p,) within bounds, and which of them no bound holds.
+
+    An active set: held one after the other, the furthest first, for others may then come back; and
+    released where the slope draws inwards, once each, so that it ends.
+
+    `z`: without bounds; `lower`, `upper` (p,): these; `solve`: from which unknowns are free, and
+    the values of all, to the most probable values where those not free stay; `slope`: from the
+    values to the gradient of the log posterior.
+    """
+    free, released = np.ones(len(z), dtype=bool), np.zeros(len(z), dtype=bool)
+    while True:
+        beyond = np.where(free, np.maximum(lower - z, z - upper), 0.0)
+        if (beyond > 0.0).any():
+            free[np.argmax(beyond)] = False
+            z = np.clip(z, lower, upper)
+        elif free.all():
+            break
+        else:
+            inwards = np.where(z <= lower, 1.0, -1.0) * slope(z)
+            inwards[free | released] = 0.0
+            if not (inwards > 0.0).any():
+                break
+            first = np.argmax(inwards)
+            free[first] = released[first] = True
+        z = solve(free, z)
+    return z, free
+
+
 def _log_shares(low: Array, high: Array) -> float:
     """Return the logarithm of what lies between two shares of each unknown, one draw at least."""
     return float(np.sum(np.log(np.maximum(high - low, 1.0 / DRAWS))))

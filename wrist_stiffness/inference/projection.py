@@ -19,15 +19,13 @@ LEFT_OUT = 1e-3
 """Share of a kernel that its columns may leave out."""
 
 
-def orthonormal(columns: Array, original_norm: Array | None = None) -> Array:
+def orthonormal(columns: Array) -> Array:
     """Orthonormal basis of the columns, (N, r), blind to their scales.
 
-    `columns` (N, k): columns, possibly dependent; `original_norm` (k,): norms before a projection;
-    a column that lost nearly all of it is left out.
+    `columns` (N, k): columns, possibly dependent.
     """
     norm = np.linalg.norm(columns, axis=0)
-    reference = norm if original_norm is None else original_norm
-    keep = (norm > ABSORBED * reference) & (norm > 0)
+    keep = norm > 0
     if not keep.any():
         return np.empty((columns.shape[0], 0))
     left, size, _ = np.linalg.svd(columns[:, keep] / norm[keep], full_matrices=False)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -42,6 +42,12 @@ PRICE_OF_GIVING = float(np.log(len(WAYS) / GIVES))
 
 MOST_FITS = 48
 """Whole fits of a search; most end after a dozen."""
+
+Ended = Literal["", "the time was over", "the limit of fits was reached"]
+"""What ends a search before every candidate worth a fit was fitted."""
+
+TIME_OVER: Ended = "the time was over"
+MANY_FITS: Ended = "the limit of fits was reached"
 
 Names = frozenset[str]
 
@@ -142,8 +148,8 @@ class Search:
         Log evidence that each candidate adds to the nominal model's, to first order.
     strength : dict of str to float
         Standard deviations that a typical size of each would leave beside it.
-    in_time : bool
-        Whether every candidate worth a fit was fitted.
+    ended : str
+        What ended it before every candidate worth a fit was fitted; empty where nothing did.
     """
 
     def __init__(
@@ -160,7 +166,7 @@ class Search:
         self.states: dict[Names, State] = {}
         self.promised: dict[str, float] = {}
         self.strength: dict[str, float] = {}
-        self.in_time = True
+        self.ended: Ended = ""
         self._asked: dict[Names, tuple[float, dict[str, float]]] = {}
         self._gained: dict[str, float] = {}
         self._fits = 0
@@ -272,8 +278,10 @@ class Search:
                 further = max((each for each in reach.values() if each < np.inf), default=0.0)
                 if log + further < best - NEGLIGIBLE:
                     continue
-                if time.monotonic() > self._end or (self._costly and self._fits >= MOST_FITS):
-                    self.in_time = False
+                if self._over():
+                    break
+                if self._costly and self._fits >= MOST_FITS:
+                    self.ended = self.ended or MANY_FITS
                     break
                 self._fits += 1
                 self._tell(f"fitting {name}{_beside(state.names)}")
@@ -342,8 +350,7 @@ class Search:
         """Return candidates with about their evidence, largest first; infinite where open."""
         found: list[tuple[float, Ranked]] = []
         for each in chosen:
-            if time.monotonic() > self._end:
-                self.in_time = False
+            if self._over():
                 break
             near = self._problem.nearly(state.fit, each)
             log = np.inf
@@ -356,6 +363,12 @@ class Search:
                     log = np.inf
             found.append((log, each))
         return sorted(found, key=lambda pair: -pair[0])
+
+    def _over(self) -> bool:
+        """Tell whether the time is over; then the search says so."""
+        if time.monotonic() > self._end:
+            self.ended = TIME_OVER
+        return self.ended == TIME_OVER
 
     def _leaders(self, *rankings: Sequence[Ranked]) -> list[Ranked]:
         """Return the first ones of some rankings that are not negligible, largest first."""

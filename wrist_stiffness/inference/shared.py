@@ -8,7 +8,11 @@ counts would both drown what a load does and make the mean look too good.
 import numpy as np
 from scipy.sparse import csr_array
 
+from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations
+
+LAW_RANK = 8
+"""Columns of the error of one law."""
 
 
 def own_covariance(observations: Observations, covariance: Array) -> Array:
@@ -102,6 +106,8 @@ class Whitened:
     shares; `alike` (n, l): columns of units under like conditions, for which a law errs alike.
     """
 
+    variance: Array  # (m,) or (n, m), of each component as it is known
+
     def __init__(self, observations: Observations, own: Array, alike: Array) -> None:
         self.observations, self._alike = observations, alike
         self._apart = Apart(observations, component_factors(own, observations.measured))
@@ -119,3 +125,13 @@ class Whitened:
     def varied(self, change: Array) -> Array:
         """Return what a change (n, m) adds where its size changes with the conditions, (N, l)."""
         return self.whiten(change[:, :, None] * self._alike[:, None, :])
+
+    def above(self, found: Evidence) -> dict[str, float]:
+        """Return what is left above the noise, RMS by quantity."""
+        measured = self.observations.measured
+        variance, own = np.broadcast_to(self.variance, measured.shape), np.zeros(measured.shape)
+        for quantity in self.observations.quantities:
+            at = list(quantity.components)
+            count = max(int(measured[:, at].sum()), 1)
+            own[:, at] = variance[:, at] * found.left_of(quantity.name, count)
+        return self.observations.rms(own)

@@ -140,7 +140,7 @@ def diagnose(
         reading.verdict,
         reading.probability,
         seen.rms(_noise(reading.state, table)),
-        seen.rms(_discrepancy(reading.state, table)),
+        table.above(reading.state.evidence),
         {q.key: before.rmse(q) for q in seen.reported},
         {q.key: after.rmse(q) for q in seen.reported},
         tuple(
@@ -153,7 +153,7 @@ def diagnose(
         standings(search, reading),
         _not_excited(problem, search),
         scope="another session" if aside.any() else "a part of this session",
-        complete=search.in_time,
+        ended=search.ended,
         predictor=Predictor(_sets(search, refused), candidates, nuisances),
         search=search,
         lost=tuple(np.flatnonzero(away).tolist()),
@@ -237,14 +237,7 @@ class _Judge:
 
 def _noise(state: State, table: Table) -> Array:
     """Variance (m,) of a unit by the noise alone."""
-    known = float(np.exp(3.0 * table.noise_width))
-    return table.variance * (state.evidence.excess if state.evidence.excess <= known else 1.0)
-
-
-def _discrepancy(state: State, table: Table) -> Array:
-    """Variance (m,) above that noise."""
-    share = state.evidence.unexplained / max(len(state.evidence.point.left), 1)
-    return table.variance * share
+    return table.variance * state.evidence.noise
 
 
 def _finding(
@@ -275,7 +268,7 @@ def _values(state: State, name: str) -> dict[str, tuple[float, float]]:
     fit: LinearFit = state.fit
     _, values = predicted_set(fit, state.evidence, 1.0).effects[name]
     term, sizes = fit.terms[name], fit.problem.sizes[name]
-    sigma = np.sqrt(np.diag(state.evidence.covariance))
+    sigma = np.sqrt(np.diag(fit.covariance_by(state.evidence)))
     own = sigma[fit.places[name]] * sizes
     found = {
         parameter.name: (float(value), float(error))

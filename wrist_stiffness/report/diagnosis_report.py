@@ -9,6 +9,7 @@ from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent, sentences
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.inference.search import TIME_OVER
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.page import (
     TITLES,
@@ -223,10 +224,10 @@ def verdict_lines(result: Diagnosis) -> list[str]:
 
 
 def _unfinished(result: Diagnosis) -> str:
-    text = "The time was over before every candidate was fitted"
+    text = f"{result.ended.capitalize()} before every candidate was fitted"
     if result.promising:
         text += f"; most promising: {', '.join(e.name for e in result.promising[:MOST_PROMISING])}"
-    return f"{text}. Allow more --seconds."
+    return f"{text}. Allow more --seconds." if result.ended == TIME_OVER else f"{text}."
 
 
 def rest_lines(result: Diagnosis) -> list[str]:
