@@ -110,6 +110,8 @@ def load_model(path: str | Path) -> ErrorModel:
         If the table cannot be read.
     """
     path = Path(path)
+    if path.suffix == ".mcap" or (path / "metadata.yaml").is_file():
+        raise InputError(f"{path}: is a recording, not a model file")
     root = read_yaml(path, InputError)
     values = MODEL(root)
     effects = tuple(_effect(node, path.parent) for node in values["effects"])
