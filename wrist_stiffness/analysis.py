@@ -15,7 +15,7 @@ A method that fails, or is cancelled, leaves everything as it was.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Any
 
@@ -102,7 +102,7 @@ class Preview:
     """
 
     effect: Effect
-    change: Array
+    change: Array = field(repr=False)
     log_gain: float
     explains: Mapping[str, tuple[float, float]]
 

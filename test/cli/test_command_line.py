@@ -3,6 +3,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import wrist_stiffness
 from wrist_stiffness.cli.main import COMMANDS, EPILOG, build_parser, main
 from wrist_stiffness.errors import GeometryError
+from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.size import Scale
 
 
@@ -141,6 +143,10 @@ def test_wrong_use_is_one_line_that_names_it(argv, named, capsys):
     [
         (["compare", "a.mcap", "--modle", "b.yaml"], "--modle b.yaml; did you mean --model? "),
         (["table", "show", "--zzz"], "--zzz "),
+        (
+            ["predict", "--angles", "1", "2", "--model", "x.yaml"],
+            "--model; here the model file stands without --model ",
+        ),
     ],
 )
 def test_an_unknown_option_is_told_by_its_own_command(argv, told, capsys):
@@ -149,6 +155,18 @@ def test_an_unknown_option_is_told_by_its_own_command(argv, told, capsys):
     command = " ".join(argv[:-1] if argv[0] == "table" else argv[:1])
     expected = f"unrecognized arguments: {told}(see 'wrist-stiffness {command} --help')"
     assert capsys.readouterr().err == f"wrist-stiffness: error: {expected}\n"
+
+
+def test_a_command_misspelt_is_told(refused):
+    assert "; did you mean diagnose? (see" in refused("diagnos")
+
+
+def test_a_model_and_a_recording_in_each_others_place_are_told(refused):
+    recording = str(Path(__file__).parents[1] / "data" / "wrist_b.mcap")
+    model = str(shipped_file("config/palmieri2015_model.yaml"))
+    said = refused("compare", recording, "--model", recording)
+    assert "is a recording, not a model file" in said
+    assert "take it after --model" in refused("compare", model)
 
 
 @pytest.mark.parametrize(

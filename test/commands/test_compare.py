@@ -72,6 +72,23 @@ def test_the_error_falls_to_the_noise_with_the_right_model(compared):
     assert values["models"][1]["depends_on"] == []
     assert "with_backlash is off by" in printed
     assert "noise and drift of the instrument, no more (" in printed
+    for row in (
+        "palmieri2015_model: surely above noise and drift",
+        "with_backlash: surely above noise and drift",
+        "with_backlash: instrument noise",
+        "palmieri2015_model: laws of the conditions, unseen part",
+    ):
+        assert f"\n  {row} " in printed
+
+
+def test_a_cut_recording_is_told_beside_the_verdict(tmp_path, capsys):
+    whole = DATA / "tutorial" / "thursday.mcap"
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole.read_bytes()[:240_000])
+    assert main(["compare", str(cut)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("cut.mcap: the recording is damaged, ") == 1
+    assert printed.index("the recording is damaged") < printed.index("How far off")
 
 
 def test_a_model_as_drawn_that_fails_is_to_be_calibrated_first(compared, tmp_path):

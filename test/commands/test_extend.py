@@ -180,13 +180,13 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
 @pytest.mark.parametrize(
     ("addition", "message"),
     [
-        (partial(effect_named, "backlash"), "write NAME@COMPONENT"),
+        (partial(effect_named, "backlash"), "write NAME@COMPONENT, such as backlash@motor_2$"),
         (partial(effect_named, "backlash@joint_1"), "component 'joint_1' is not one of"),
         (partial(effect_named, "rust@joint_1"), "unknown effect 'rust'"),
         (partial(effect_named, "encoder_offset@motor_1"), "'calibrate' fits it"),
         (partial(effect_named, "thermal_expansion@link_1"), "temperature of ambient is missing"),
         (partial(own_effect, "nothing.py:Bow@platform"), "no file"),
-        (partial(own_effect, "nothing.py:Bow"), "of your own, laws.py:Twist@platform"),
+        (partial(own_effect, "nothing.py:Bow"), "such as laws.py:Twist@platform"),
         (
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "sin(theta_1)", {}),
             "has no parameter to fit",
@@ -217,6 +217,12 @@ def test_what_cannot_be_added_is_one_clear_line(model, extend_by, addition, mess
     assert not (tmp_path / "model2.yaml").exists()
 
 
+def test_a_file_given_as_an_effect_is_led_to_its_option(tmp_path, capsys):
+    given = ["--effect", "laws.py:Twist@platform", "--fit", str(RECORDING)]
+    assert main(["extend", *given, "-o", str(tmp_path / "m.yaml")]) == 2
+    assert "goes after --effect-file" in capsys.readouterr().err
+
+
 def test_covariates_of_the_recordings_are_no_parameters():
     addition = FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "swell_um * humidity * fx", {})
     effect = addition.effect(["humidity", "air"])
@@ -236,7 +242,9 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
     true_um = 1e6 * np.sqrt(3.0 * (shift.white**2 / 5.0 + shift.wander**2))
     assert told["after"]["rmse_s_um"] < 1.1 * true_um
     assert told["after"]["rmse_phi_mdeg"] < 1.2 * told["noise"]["phi_mdeg"]
-    assert "remaining error: no more than the noise" in capsys.readouterr().out
+    assert (
+        "in the fit to the whole session no more than the noise remains" in capsys.readouterr().out
+    )
     summary = replay(RECORDING, output, tmp_path / "out.mcap")
     assert summary.predictions == summary.joint_states > 0
 

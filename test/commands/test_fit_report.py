@@ -1,19 +1,28 @@
 """What a fit tells a technician."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from wrist_stiffness.identification.base_fit import fit_cleaned
 from wrist_stiffness.identification.calibration import fitted
 from wrist_stiffness.identification.free_effects import free_all
 from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.inference import Quantity
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.report.fit_lines import told_lines, tolerances, untold_lines, used_lines
+from wrist_stiffness.report.fit_lines import (
+    left_line,
+    told_lines,
+    tolerances,
+    untold_lines,
+    used_lines,
+)
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file
@@ -61,3 +70,21 @@ def test_rests_that_nothing_measured_are_not_counted():
     free = (free_all(Effect(find_law("encoder_offset"), "motor_1")),)
     found = fitted(*fit_cleaned(FitProblem(model, (as_units(model, session),), free)))
     assert used_lines([session], found)[0].startswith("s: 15 dwells and 0 half seconds in motion")
+
+
+@pytest.mark.parametrize(
+    ("unseen", "said"),
+    [(0.9, "the unseen part shows none of it"), (1.1, "an effect is missing ('wrist-stiffness ")],
+)
+def test_an_effect_is_missing_only_where_the_unseen_part_is_above_the_noise(unseen, said):
+    """Errors of data not seen and of the fit to all stand together: the line says of which."""
+    table = SimpleNamespace(reported=[Quantity("s", "um", (0, 1, 2), 1e6)])
+    fit = SimpleNamespace(
+        rough=True,
+        noise={"s_um": 1.0},
+        discrepancy={"s_um": 3.5},
+        problem=SimpleNamespace(table=table),
+    )
+    line = left_line(fit, {"s_um": unseen}, 1)
+    begin = "in the fit to the whole session 3.5 um of s remain above the noise"
+    assert line.startswith(f"{begin}: {said}")

@@ -41,6 +41,11 @@ def test_a_copy_of_a_recording_is_no_second_session(tmp_path, model):
     assert session.remarks[-1] == f"{copy} holds the same measurements: used once"
 
 
+def test_a_recording_given_twice_is_used_once_and_said(model):
+    (session,) = read([THURSDAY, THURSDAY], model).values()
+    assert "given more than once: used once" in session.remarks
+
+
 def test_a_replay_and_an_import_of_a_recording_are_no_further_sessions(tmp_path, model):
     replayed, exported = tmp_path / "replayed.mcap", tmp_path / "thursday.csv"
     replay(THURSDAY, SHIPPED, replayed)

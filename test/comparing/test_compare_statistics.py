@@ -247,7 +247,7 @@ def test_headroom_is_the_share_of_what_could_fall(dwells):
     assert found.headroom(found.models[2], "s_um") == pytest.approx(1.0, abs=0.05)
     assert 0.6 < found.headroom(found.models[1], "s_um") < 0.85
     assert "m0 is off by" in found.verdict[0]
-    assert "above noise and drift" in found.verdict[0]
+    assert "surely above noise and drift" in found.verdict[0]
     assert "noise and drift of the instrument, no more (" in found.verdict[2]
     assert "s falls from" in found.verdict[3]
     assert (

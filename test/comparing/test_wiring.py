@@ -79,6 +79,8 @@ def test_positions_in_metres_where_millimetres_belong_are_told(model, pointed):
     sentence = told(model, metres)
     fall = re.search(r"positions times 1000 the error falls from (\S+) to (\S+) um", sentence)
     assert float(fall[1]) > 2.0 * float(fall[2])
+    right = compare_models([("m", model)], [replace(measured, covariance=None)]).models[0]
+    assert float(fall[2]) == pytest.approx(right.explained.error["s_um"], rel=0.02)
     assert "are they in m where mm belong" in sentence
 
 

@@ -61,8 +61,9 @@ def test_python_on_the_page_runs(monkeypatch):
     names = {
         "time": np.array([0.0, 0.1]),
         "theta": np.radians([[5.0, 5.0], [6.0, 5.0]]),
-        "load": np.array([[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]] * 2),
+        "load": np.array([[1.0, 0.5, -2.0, 0.0, 0.0, 0.0]] * 2),
     }
     exec(blocks("python")[2], names)
+    assert names["prediction"].warnings == ()
     assert np.allclose(names["several"][1].twist, names["recording"].twist, rtol=1e-12)
     assert np.array_equal(names["tried"].twist, names["prediction"].twist)

@@ -126,6 +126,7 @@ def test_a_rest_within_the_uncertainty_is_no_reason_to_search(model_path, loaded
         pose = [*shift, *Rotation.from_matrix(turned).as_quat()]
         verdicts.append(explain(model_path, POSE.tolist(), LOAD, measured=pose).verdict)
     assert "no more than the uncertainty" in verdicts[0]
+    assert "2.1 x and 0 x the uncertainty of the prediction: " in verdicts[1]
     assert "an effect is missing" in verdicts[1]
     assert explain(model_path, POSE.tolist(), LOAD).verdict == ""
 

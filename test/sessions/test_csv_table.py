@@ -200,8 +200,8 @@ def changed(row, column, value):
     [
         (changed(4, "fx_N", "o.5"), r"row 4, column fx_N: 'o\.5' is no number"),
         (changed(4, "fx_N", '"-5,9e-05"'), r"'-5,9e-05' is no number: write -5\.9e-05, with a dec"),
-        (changed(3, "motor_2_deg", ""), "row 3, column motor_2_deg: blank"),
-        (changed(7, "fx_N", "nan"), "row 7, column fx_N: blank"),
+        (changed(3, "motor_2_deg", ""), "row 3, column motor_2_deg is blank: .*delete the line"),
+        (changed(7, "fx_N", "nan"), "row 7, column fx_N is NaN: .*delete the line"),
         (changed(7, "x_mm", "inf"), "row 7, column x_mm: 'inf' is not finite"),
         (changed(4, "motor_1_deg", "400"), "row 4, column motor_1_deg: 400 is outside -360 to 360"),
         (changed(4, "fx_N", "-1e6"), "row 4, column fx_N: -1e6 is outside -10000 to 10000 N"),

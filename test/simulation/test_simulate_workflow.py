@@ -176,6 +176,7 @@ def test_blind_recording_is_opened_by_its_seed_alone(wrist, tmp_path, capsys):
     [
         (0.005756, "rad", "329.8 mdeg"),
         (8e-6, "m", "8 um"),
+        (0.014022, "m", "14.02 mm"),
         (2e-6, "m/N", "2 um/N"),
         (0.2, "-", "0.2"),
         (1e-5, "1/K", "1e-05 1/K"),

@@ -134,6 +134,10 @@ def _addition(arguments: argparse.Namespace) -> Effect | FormulaEffect:
         if arguments.component or arguments.direction or arguments.start:
             raise InputError("--component, --direction and --start belong to --formula")
         if arguments.effect is not None:
+            if ".py" in arguments.effect:
+                raise InputError(
+                    f"effect {arguments.effect!r}: a law in a Python file goes after --effect-file"
+                )
             return effect_named(arguments.effect)
         return own_effect(arguments.effect_file)
     if arguments.component is None or arguments.direction is None:

@@ -74,8 +74,18 @@ class OneLineParser(argparse.ArgumentParser):
         found, left = super().parse_known_args(args, namespace)
         if left:
             advice = "".join(meant(each, self._option_string_actions) for each in left)
+            if "--model" in left and any(each.dest == "model" for each in self._actions):
+                advice = "; here the model file stands without --model"
             self.error(f"unrecognized arguments: {' '.join(left)}{advice}")
         return found, left
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError as error:
+            raise argparse.ArgumentError(
+                action, f"{error.message}{meant(str(value), map(str, action.choices or ()))}"
+            ) from error
 
     def error(self, message: str) -> NoReturn:
         """Exit with code 2 and one line on stderr."""

@@ -188,6 +188,8 @@ def in_usual_units(magnitude: float, si: str) -> str:
 
     head, per, rest = si.partition("/")
     factor, unit = USUAL_UNITS.get(head, (1.0, head))
+    if si == "m" and abs(magnitude) >= 1e-3:
+        factor, unit = 1e3, "mm"
     return f"{number(factor * magnitude, 4)} {unit}{per}{rest}".removesuffix(" -")
 
 

@@ -22,6 +22,7 @@ from wrist_stiffness.comparing.wiring import WORTH_ASKING
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
+from wrist_stiffness.sessions.measured_session import DAMAGED
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,11 @@ class Compared:
         return worst_poses(model.refitted, found.noise, found.sessions)
 
     @property
+    def damage(self) -> tuple[str, ...]:
+        """Recordings that are cut or damaged, and how much of them was read."""
+        return tuple(remark for remark in self.remarks if f": {DAMAGED}" in remark)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What a reader must know of the numbers."""
         fitted = tuple(
@@ -58,17 +64,23 @@ class Compared:
 
     def levels(self) -> list[tuple[str, dict[str, float]]]:
         """Return what the errors are to be compared with, by name."""
-        found, last = self.comparison, self.comparison.models[-1].explained
+        found = self.comparison
+        models, last = found.models, found.models[-1]
+        of = {each.name: f"{each.name}: " if len(models) > 1 else "" for each in models}
         levels = [
-            ("above noise and drift", last.above),
-            ("instrument noise", last.noise),
-            ("drift of the instrument", last.drift),
+            *(
+                (f"{of[each.name]}surely above noise and drift", each.explained.above)
+                for each in models
+            ),
+            (f"{of[last.name]}instrument noise", found.noise),
+            (f"{of[last.name]}drift of the instrument", last.explained.drift),
         ]
         if found.repeated_by_side:
             levels.append(("repeatability, from the same side", found.repeated_by_side))
         if found.repeated:
             levels.append(("repeatability, from any side", found.repeated))
-        return [*levels, ("laws of the conditions, unseen part", found.reachable)]
+        laws = f"{of[models[0].name]}laws of the conditions, unseen part"
+        return [*levels, (laws, found.reachable)]
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""

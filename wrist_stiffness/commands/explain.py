@@ -231,9 +231,11 @@ def _verdict(rest: Array, covariance: Array) -> str:
     )
     if ratio.max() <= WITHIN:
         return f"{left}: no more than the uncertainty of the prediction"
+    shift, turn = np.round(ratio, 2)
     return (
-        f"{left}, {ratio.max():.2g} x the uncertainty of the prediction: the measurement is off, "
-        "or an effect is missing ('compare' and 'diagnose' tell from many poses)"
+        f"{left}, {shift:.2g} x and {turn:.2g} x the uncertainty of the prediction: the "
+        "measurement is off, or an effect is missing ('compare' and 'diagnose' tell from many "
+        "poses)"
     )
 
 

@@ -78,7 +78,7 @@ class FormulaEffect:
 
 def own_effect(name: str) -> Effect:
     """Return the effect of a user's own law, `FILE.py:CLASS@COMPONENT`; the file is run."""
-    reference, component = at_component(name)
+    reference, component = at_component(name, "laws.py:Twist@platform")
     return Effect(law_from_file(reference, Path.cwd()), component)
 
 

@@ -228,7 +228,8 @@ def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
                 decimal = len(cells) > len(header) and form.separator == ","
                 why = "; decimal commas need semicolons or tabs between columns" if decimal else ""
                 raise InputError(f"{place}: {len(cells)} cells for {len(header)} columns{why}")
-            text = dict(zip(header, map(_blank_if_nan, cells), strict=True))
+            written = dict(zip(header, cells, strict=True))
+            text = {name: _blank_if_nan(cell) for name, cell in written.items()}
             if form.separator != ",":
                 mark = _with_points(place, text, mark)
             try:
@@ -252,7 +253,7 @@ def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
             for name, read in readers.items():
                 if not text[name].strip():
                     if name in required:
-                        raise InputError(f"{place}, column {name}: blank")
+                        raise InputError(_missing(place, name, written[name]))
                     continue
                 try:
                     values[name] = read(text[name])
@@ -263,6 +264,12 @@ def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
 
 def _blank_if_nan(cell: str) -> str:
     return "" if cell.strip().lower() == "nan" else cell
+
+
+def _missing(place: str, name: str, cell: str) -> str:
+    is_what = "is NaN" if cell.strip() else "is blank"
+    why = "angles and loads must be in every line; delete the line"
+    return f"{place}, column {name} {is_what}: {why}"
 
 
 def _with_points(place: str, text: dict[str, str], mark: str) -> str:

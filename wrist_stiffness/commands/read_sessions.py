@@ -68,6 +68,7 @@ def read_sessions(
         If a recording cannot be used.
     """
     paths = recordings_in(recordings.paths)
+    given = Counter(path for each in recordings.paths for path in recordings_in([each]))
     found: dict[Path, MeasuredSession] = {}
     first: dict[str, Path] = {}
     for done, path in enumerate(paths):
@@ -76,8 +77,9 @@ def read_sessions(
         session = read_session(path, table, remaps=recordings.topics, settings=settings)
         same = first.setdefault(measured_sha256(session), path)
         if same == path:
+            twice = ["given more than once: used once"] if given[path] > 1 else []
             found[path] = _with_remarks(
-                session, [*_without_meaning(session), *_without_signal(session, models)]
+                session, [*twice, *_without_meaning(session), *_without_signal(session, models)]
             )
         else:
             said = f"{path} holds the same measurements: used once"

@@ -164,7 +164,7 @@ class Comparison:
         if not (state.discrepant.any() or state.misfit):
             sure = percent(found.answer.nothing)
             return f"noise and drift of the instrument, no more ({sure} sure)"
-        return f"{self._sizes(found.above)} are above noise and drift of the instrument"
+        return f"{self._sizes(found.above)} are surely above noise and drift of the instrument"
 
     def _fall(self, quantity: Quantity) -> str:
         first, last = self.models[0], self.models[-1]

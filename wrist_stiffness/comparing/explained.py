@@ -134,7 +134,10 @@ class Explained:
 
     @cached_property
     def above(self) -> dict[str, float]:
-        """What is left above noise and drift, RMS."""
+        """What laws of the conditions surely explain above noise and drift, RMS.
+
+        With a misfit, which no law explains, the rest above the noise counts too.
+        """
         parts, found = self.parts.values(), {}
         rest = self._rms(np.nan_to_num(self.observations.values - self._fitted(parts)))
         for quantity in self.observations.reported:

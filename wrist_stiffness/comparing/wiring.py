@@ -75,6 +75,10 @@ class Mistake:
         """Return it beside a load so many times as large."""
         return replace(self, block=lambda block: _load(times)(self.block(block)))
 
+    def unit(self, key: str) -> float:
+        """Return how many units of a quantity one unit of the instrument really is."""
+        return self.shift_factor if key == "s_um" else 1.0
+
     def concerns(self, session: UnitSession) -> bool:
         """Tell whether the session could have it: a measured rotation names its own motors."""
         same_angles = self.block(session.block).theta is session.block.theta
@@ -204,11 +208,14 @@ def suspected(
         if before[key] > floor[key]
     ]
     share = min(shares, default=1.0)
+    right = {key: size * mistake.unit(key) for key, size in after.items()}
     fall = " and ".join(
-        f"from {before[q.key]:.3g} to {after[q.key]:.3g} {q.unit} of {q.name}"
+        f"from {before[q.key]:.3g} to {right[q.key]:.3g} {q.unit} of {q.name}"
         for q in left.observations.reported
     )
-    return Suspicion(mistake, float(weights.max() / total), share, f"the error falls {fall}")
+    # Below the noise what is left of larger positions may be larger.
+    verb = "falls" if all(right[key] < before[key] for key in right) else "goes"
+    return Suspicion(mistake, float(weights.max() / total), share, f"the error {verb} {fall}")
 
 
 def told_mistake(suspicion: Suspicion | None) -> str:
@@ -234,7 +241,10 @@ def _without(
     observed: Observed,
     calibrated: Sequence[str],
 ) -> dict[str, float]:
-    """Return the error left without a mistake, in units of the instrument; empty if it is none."""
+    """Return the error left without a mistake, in units of the instrument; empty if it is none.
+
+    In its own units noise and errors compare with what they were before.
+    """
     if not all(mistake.concerns(session) for session in observed.sessions):
         return {}
     right = tuple(mistake.put_right(session) for session in observed.sessions)
@@ -244,4 +254,4 @@ def _without(
     predicted = observed.predicted if same else None
     _, refitted, _ = without_set_up(model, right, calibrated, predicted)
     left = refitted.rms(np.nan_to_num(refitted.values) ** 2)
-    return {k: size / (mistake.shift_factor if k == "s_um" else 1.0) for k, size in left.items()}
+    return {key: size / mistake.unit(key) for key, size in left.items()}

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from wrist_stiffness.atomic_file import writing
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, TableError
 from wrist_stiffness.inputs.document import Node, read_yaml
 from wrist_stiffness.inputs.opening import open_input
 from wrist_stiffness.inputs.schema import (
@@ -110,11 +110,18 @@ def load_model(path: str | Path) -> ErrorModel:
         If the table cannot be read.
     """
     path = Path(path)
+    if path.suffix == ".mcap" or (path / "metadata.yaml").is_file():
+        raise InputError(f"{path}: is a recording, not a model file")
     root = read_yaml(path, InputError)
     values = MODEL(root)
     effects = tuple(_effect(node, path.parent) for node in values["effects"])
     entry = values["table"]
     table_file = path.parent / entry["path"]
+    if not table_file.exists():
+        raise TableError(
+            f"{root['table']['path'].place}: there is no table {table_file}; the path is relative "
+            "to the model file: if that was moved, write the new path"
+        )
     table = load_table(table_file)
     if (wanted := entry.get("checksum", table.checksum)) != table.checksum:
         raise root["table"]["checksum"].refuse(

@@ -21,8 +21,8 @@ class Prediction:
     """Predicted pose error of the platform, T_err = exp(twist)."""
 
     twist: Array  # (6,), at O in F, own weight included [m, rad]
-    configuration: Configuration
-    active: NDArray[np.bool_]  # (m,), flange sectors in contact
+    configuration: Configuration = field(repr=False)
+    active: NDArray[np.bool_] = field(repr=False)  # (m,), flange sectors in contact
     # configuration and twist -> covariance (6, 6) of what the table says
     of_table: Callable[[Configuration, Array], Array] = field(repr=False)
     # pair of (6,), X and Y of the pose sensor in F [m, rad]; None for nothing

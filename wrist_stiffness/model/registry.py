@@ -72,21 +72,18 @@ def effect_named(name: str) -> Effect:
 
     Raises `InputError` if it is no such name, or there is no such law.
     """
-    law, component = at_component(name)
+    law, component = at_component(name, "backlash@motor_2")
     return Effect(find_law(law), component)
 
 
-def at_component(text: str) -> tuple[str, str]:
+def at_component(text: str, example: str) -> tuple[str, str]:
     """Split `NAME@COMPONENT`.
 
-    Raises `InputError` if one of them is missing.
+    `example`: such a name, for the error.  Raises `InputError` if one of them is missing.
     """
     name, _, component = text.rpartition("@")
     if not name or not component:
-        raise InputError(
-            f"effect {text!r}: write NAME@COMPONENT, such as backlash@motor_2 or, of your own, "
-            "laws.py:Twist@platform"
-        )
+        raise InputError(f"effect {text!r}: write NAME@COMPONENT, such as {example}")
     return name, component
 
 

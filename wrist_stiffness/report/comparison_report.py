@@ -48,6 +48,8 @@ HOW = (
     "What is left is asked as in diagnose: noise, drift of the instrument, and smooth laws of the "
     "conditions, each of which may be there or not. A law is told from a probability of 90 % on: "
     "the evidence of all sets of laws that hold it, against those without it.",
+    "Surely above noise and drift is what these laws explain, not the root of the difference of "
+    "the squares of error and noise.",
     "A size is the part of the error that goes with a condition, beyond what the refit could take "
     "up; +- is one standard uncertainty, a band two.",
     "Laws of the conditions, unseen part: what these laws leave of stretches that were not used to "
@@ -58,7 +60,7 @@ HOW = (
 def comparison_lines(compared: Compared) -> list[str]:
     """Return the answer for a terminal, of what depends and of the worst that of the last model."""
     found = compared.comparison
-    return [*found.verdict, *lines_of(_sections(compared, found.models[-1:]))]
+    return [*found.verdict, *compared.damage, *lines_of(_sections(compared, found.models[-1:]))]
 
 
 def report_of_comparison(compared: Compared) -> Page:
@@ -84,7 +86,7 @@ def report_of_comparison(compared: Compared) -> Page:
     return Page(
         f"{', '.join(names)} compared with measurements",
         f"{', '.join(found.sessions)}: {units} dwells and half seconds in motion",
-        found.verdict,
+        [*found.verdict, *compared.damage],
         {
             **sections,
             "Where it fails": [where, *sections["Where it fails"]],
@@ -100,11 +102,12 @@ def _sections(compared: Compared, models: Sequence[ComparedModel]) -> dict[str, 
     depends: list[Part] = []
     for model in models:
         depends += [f"{model.name}:", Bullets(sentences(model.explained))]
+    notes = [each for each in compared.notes if each not in compared.damage]
     return {
         "How far off": [_sizes(compared), _levels(compared)],
         "On what the error depends": depends,
         "Where it fails": [_worst(compared, models[-1])],
-        "To be kept in mind": [Bullets(compared.notes)] if compared.notes else [],
+        "To be kept in mind": [Bullets(notes)] if notes else [],
     }
 
 
@@ -198,4 +201,5 @@ def _worst(compared: Compared, model: ComparedModel) -> Table:
         ]
         for pose in compared.worst(model)
     ]
-    return Table(f"Where {model.name} fails worst.", [*head, *map(_label, quantities)], rows)
+    caption = f"Where {model.name} fails worst, the largest error over the noise first."
+    return Table(caption, [*head, *map(_label, quantities)], rows)

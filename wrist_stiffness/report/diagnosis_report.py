@@ -49,7 +49,7 @@ HOW = (
     "Every set of effects was fitted whole and judged by its evidence: how probable the recordings "
     "are under it, with all values integrated over their priors. The probabilities follow from it.",
     "Beside the effects stands a discrepancy without a name, a smooth law of the conditions. What "
-    "it explains is left above the noise.",
+    "it explains is left above noise and drift.",
     "Held-out errors are those of another session where there is one, else of the end of the only "
     "one, by models whose values were fitted to the rest.",
     "Effects in one class cannot be told apart by these recordings.",
@@ -115,16 +115,15 @@ def _sections(result: Diagnosis) -> dict[str, list[Part]]:
         findings.append(f"{place}. {class_of(finding)}. {finding.evidence}")
         findings += [f"To be sure: {finding.check}."] if finding.check else []
         findings.append(_numbers(finding))
-    with_findings = [("with the findings", result.after)] if result.findings else []
+    findings_in = [("with the findings (held out)", result.after)] if result.findings else []
     rows = (
-        ("calibrated model", result.before),
-        *with_findings,
-        ("instrument noise", result.noise),
-        ("left above the noise", result.discrepancy),
+        ("calibrated model (held out)", result.before),
+        *findings_in,
+        ("instrument noise, without drift", result.noise),
+        ("left above noise and drift (all data)", result.discrepancy),
     )
-    held_out = "The first two rows are" if result.findings else "The first row is"
     table = Table(
-        f"RMS. {held_out} of held-out data: {result.scope}.",
+        f"RMS. Held out: {result.scope}; these rows hold the instrument's drift too.",
         ["", *(TITLES[key] for key in result.before)],
         [[name, *(number(row[key]) for key in result.before)] for name, row in rows],
     )

@@ -92,16 +92,30 @@ def _judged_lines(
         for name, row in {**rows, "noise and drift alone": fit.noise}.items()
     ]
     table = Table("", ["", *(TITLES.get(key, key) for key in fit.noise)], cells)
-    left = "remaining error: no more than the noise"
-    if fit.rough:
-        above = " and ".join(
-            f"{fit.discrepancy[q.key]:.3g} {q.unit} of {q.name}"
-            for q in fit.problem.table.reported
-            if fit.discrepancy[q.key] > 0.0
-        )
-        left = f"remaining error above the noise: {above}: {NOT_AT_THE_FLOOR}"
+    *_, after = rows.values()
     judged = f"judged {JUDGED_BY[judged_by]}"
-    return [*used_lines(sessions, fit), "", *table.lines(), judged, left]
+    return [
+        *used_lines(sessions, fit),
+        "",
+        *table.lines(),
+        judged,
+        left_line(fit, after, len(sessions)),
+    ]
+
+
+def left_line(fit: WristFit, after: Mapping[str, float], sessions: int) -> str:
+    """Tell what a fit to so many sessions leaves; `after`: its error on data not seen, RMS."""
+    where = f"in the fit to {'the whole session' if sessions == 1 else 'all sessions'}"
+    if not fit.rough:
+        return f"{where} no more than the noise remains"
+    above = " and ".join(
+        f"{fit.discrepancy[q.key]:.3g} {q.unit} of {q.name}"
+        for q in fit.problem.table.reported
+        if fit.discrepancy[q.key] > 0.0
+    )
+    unseen_is_noise = all(after[key] <= size for key, size in fit.noise.items())
+    why = "the unseen part shows none of it" if unseen_is_noise else NOT_AT_THE_FLOOR
+    return f"{where} {above} remain above the noise: {why}"
 
 
 def used_lines(sessions: Sequence[MeasuredSession], found: WristFit) -> list[str]:

@@ -16,6 +16,9 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.sessions.gauges import Gauges
 from wrist_stiffness.sessions.in_pieces import in_pieces
 
+DAMAGED = "the recording is damaged"
+"""How a remark begins that tells of it."""
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSession:

@@ -37,6 +37,11 @@ def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
     for path in map(Path, paths):
         if not os.path.exists(path):
             raise RecordingError(f"{path} does not exist")
+        if path.suffix in (".yaml", ".yml"):
+            raise RecordingError(
+                f"{path} is no recording; if it is a model: compare, diagnose and replay take it "
+                "after --model, other commands first"
+            )
         if is_recording(path) or not path.is_dir():
             found[path] = None
             continue
