@@ -52,6 +52,13 @@ def test_nothing_missing_says_how_sure_that_is():
     assert line == "Nothing is missing: what is left is noise (97 % sure)."
 
 
+def test_nothing_missing_is_not_said_where_it_is_not_likely():
+    (line,) = verdict_lines(answer("none", probability=0.14))
+    assert line == "Not decided: what is left may be noise (14 %) or an effect listed below."
+    ended = replace(answer("none", probability=0.14), ended=TIME_OVER)
+    assert "time was over" in verdict_lines(ended)[1]
+
+
 def test_what_is_named_comes_with_its_probability_and_with_what_is_left():
     lines = verdict_lines(answer("effect", [GROWTH], {"the load": 0.8, "the speed": 0.2}))
     assert lines[0] == "Missing in the model: thermal_expansion@platform, 97 % sure."

@@ -209,7 +209,11 @@ def _depends(found: Diagnosed, left: Explained) -> list[Part]:
 def verdict_lines(result: Diagnosis) -> list[str]:
     """Return the verdict in one or two sentences."""
     if result.verdict == "none":
-        return [f"Nothing is missing: what is left is noise ({percent(result.probability)} sure)."]
+        sure = percent(result.probability)
+        decided = f"Nothing is missing: what is left is noise ({sure} sure)."
+        if result.probability < 0.5:
+            decided = f"Not decided: what is left may be noise ({sure}) or an effect listed below."
+        return [decided] if result.complete else [decided, _unfinished(result)]
     found = "; ".join(f"{class_of(e)}, {percent(e.probability)} sure" for e in result.findings)
     lines = [f"Missing in the model: {found}."] if found else []
     if not result.complete:
