@@ -214,7 +214,8 @@ def suspected(
         for q in left.observations.reported
     )
     # Below the noise what is left of larger positions may be larger.
-    verb = "falls" if all(right[key] < before[key] for key in right) else "goes"
+    larger = any(right[key] > before[key] for key in right if mistake.unit(key) != 1.0)
+    verb = "goes" if larger else "falls"
     return Suspicion(mistake, float(weights.max() / total), share, f"the error {verb} {fall}")
 
 
