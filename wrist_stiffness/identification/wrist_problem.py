@@ -32,7 +32,7 @@ from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.search import Ranked, Trial, ranked
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.unit_session import UnitSession
 
@@ -44,7 +44,7 @@ not find back, and with walls little by little."""
 FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
 """Multiples of the typed values that are tried."""
 
-PLAYS = tuple(np.geomspace(1e-3, 10.0, 9).tolist())
+PLAYS = np.geomspace(1e-3, 10.0, 9).tolist()
 """Multiples of the usual play that are tried: play is seen from far below a micrometre on, and a
 fit that begins with too much of it does not find back."""
 
@@ -122,8 +122,7 @@ class WristProblem:
         if candidate not in self._near:
             begun = candidate.effect(ranked.z, ranked.shape)
             if has_walls(begun.law):
-                usual = begun.with_values({p.key: p.mean or p.scale for p in begun.parameters})
-                begun = _best_multiple(fit.base, self.about(fit), usual, PLAYS)
+                begun = _best_of(fit.base, self.about(fit), begun, _plays(begun))
             self._near[candidate] = self.beside(fit, begun)
         return self._near[candidate]
 
@@ -160,7 +159,7 @@ class WristProblem:
     def _extend(self, fit: WristFit, effect: Effect) -> WristFit:
         point = self.about(fit)
         if any(not np.isfinite(parameter.scale) for parameter in effect.parameters):
-            start = _best_multiple(fit.base, point, effect)
+            start = _best_of(fit.base, point, effect, _multiples(effect))
             return self._fitted([*fit.base.beyond().values(), start], fit.base)
         (candidate,) = wrist_candidates(point, [(effect.law, effect.component)])
         (best,) = ranked(evidence(fit.point, self.background), [self._trial(candidate)])
@@ -213,13 +212,28 @@ class WristProblem:
         return WristPoint(tuple(models))
 
 
-def _best_multiple(
-    fitted: BaseFit, point: WristPoint, effect: Effect, factors: Sequence[float] = FACTORS
+def _plays(effect: Effect) -> list[dict[str, float]]:
+    """Return values of a law with walls from next to no play to much."""
+    return [{p.key: p.mean or factor * p.scale for p in effect.parameters} for factor in PLAYS]
+
+
+def _multiples(effect: Effect) -> list[dict[str, float]]:
+    """Return multiples of the values that somebody typed."""
+    typed = {key: estimate.value or 1.0 for key, estimate in effect.estimates.items()}
+    factors = FACTORS if len(FACTORS) ** len(typed) <= MOST_MULTIPLES else (-1.0, 1.0)
+    return [
+        {key: value * f for (key, value), f in zip(typed.items(), each, strict=True)}
+        for each in islice(product(factors, repeat=len(typed)), MOST_MULTIPLES)
+    ]
+
+
+def _best_of(
+    fitted: BaseFit, point: WristPoint, effect: Effect, tried: Sequence[dict[str, float]]
 ) -> Effect:
-    """Return an effect at the multiple of its values that explains most beside a base that follows.
+    """Return an effect at the values that explain most beside a base that follows.
 
     `fitted`: what everything else explains, which to first order follows; `point`: the same, for
-    trials; `effect`: with the values that somebody typed; `factors`: of these.
+    trials; `tried`: its values, each brought within its bounds.
     """
     # Weights where there is no prior are tiny: QR keeps them apart from rounding.
     root, weights = np.sqrt(max(1.0, fitted.variance)), fitted.problem.weights
@@ -230,15 +244,9 @@ def _best_multiple(
         rows = np.concatenate([white / root, offset])
         return np.asarray(rows - basis @ (basis.T @ rows))
 
-    typed = {key: estimate.value or 1.0 for key, estimate in effect.estimates.items()}
-    if len(factors) ** len(typed) > MOST_MULTIPLES:
-        factors = (-1.0, 1.0)
-    tried = [
-        {key: value * f for (key, value), f in zip(typed.items(), each, strict=True)}
-        for each in islice(product(factors, repeat=len(typed)), MOST_MULTIPLES)
-    ]
     changes = point.changes([(effect.law, effect.component, each) for each in tried])
     white = whiten(np.moveaxis(changes, 0, -1))
     explained = beyond(white, np.zeros((len(weights), len(tried))))
     left = beyond(whiten(fitted.residual), weights * fitted.z)[:, None] - explained
-    return effect.with_values(tried[int(np.argmin(np.sum(left**2, axis=0)))])
+    best = tried[int(np.argmin(np.sum(left**2, axis=0)))]
+    return effect_at(effect.law, effect.component, best)
