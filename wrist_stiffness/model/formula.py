@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,7 +13,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.model.memory import play
+from wrist_stiffness.model.memory import lagged, play
 
 NO_UNITS: Mapping[str, float] = MappingProxyType({})
 
@@ -51,16 +50,9 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Value]]] = {
 
 
 def _lag(x: Array, tau: float, time: Array, state: State | None) -> tuple[Array, State]:
-    """Follow x late, with a time constant; exact where x is straight between the samples."""
-    before, last, now = state or (float(time[0]), float(x[0]), float(x[0]))
-    found = []
-    for t, value in zip(time.tolist(), x.tolist(), strict=True):
-        if (step := t - before) > 0.0:
-            late = (value - last) / step * tau
-            now = value - late + (now - last + late) * math.exp(-step / tau)
-        before, last = t, value
-        found.append(now)
-    return np.array(found), (before, last, now)
+    """Follow x late, with a time constant."""
+    found, state = lagged(time, x[:, None], tau, state)
+    return found[:, 0], state
 
 
 def _play(x: Array, slack: float, time: Array, state: State | None) -> tuple[Array, State]:
@@ -69,7 +61,7 @@ def _play(x: Array, slack: float, time: Array, state: State | None) -> tuple[Arr
     return found, (float(found[-1]),)
 
 
-State = tuple[float, ...]
+State = tuple[Any, ...]
 Remembering = Callable[[Array, float, Array, State | None], tuple[Array, State]]
 
 MEMORIES: dict[str, Remembering] = {"lag": _lag, "play": _play}

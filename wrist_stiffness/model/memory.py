@@ -1,14 +1,11 @@
-"""Sums over the past that laws with memory share, whole blocks at once.
-
-Both are compositions of maps (clamps, affine maps), which are associative: a block of n samples
-takes log2(n) passes of NumPy instead of n steps of Python.
-"""
+"""What laws with memory share, whole blocks at once instead of a step of Python for each sample."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from wrist_stiffness.mechanism.components import Array
 
@@ -21,6 +18,7 @@ def play(values: Array, half_width: Array | float, start: Array | None) -> Array
     in any split of the samples.
     """
     low, high = values - half_width, values + half_width
+    # Clamps one after the other are associative: a block of n samples takes log2(n) passes.
     step = 1
     while step < len(values):
         # Clamp after clamp is a clamp: the earlier limits, clamped by the later ones.
@@ -49,21 +47,22 @@ def slope(time: Array, values: Array, before: Before | None) -> tuple[Array, Bef
 
 
 def lag(values: Array, interval: Array, time_constant: float, before: Array, start: Array) -> Array:
-    """Follow a value with a first-order lag, exact for the mean of neighbouring samples held.
+    """Follow a value with a first-order lag, exact where it is straight between the samples.
 
     `values` (n, k): u, the driving value.  `interval` (n,): time since the sample before [s]; the
     first one since the block before.  `time_constant` [s], above 0.  `before`, `start` (k,): u and
     x of the sample before the block.  Gives (n, k): x with x' = (u - x) / time_constant.
     """
-    decay = np.exp(-interval / time_constant)[:, None]
+    steps = (interval / time_constant)[:, None]
     earlier = np.concatenate([before[None], values[:-1]])
-    sum_ = -np.expm1(-interval / time_constant)[:, None] * (0.5 * (earlier + values))
-    step = 1
-    while step < len(values):
-        sum_[step:] = sum_[step:] + decay[step:] * sum_[:-step]
-        decay[step:] = decay[step:] * decay[:-step]
-        step *= 2
-    return decay * start + sum_
+    # Of a straight step, what of its mean over the weights exp(-t) is not followed yet.
+    gone = -np.expm1(-steps)
+    late, decay = np.divide(gone, steps, out=np.ones_like(steps), where=steps > 0.0), 1.0 - gone
+    followed = (1.0 - late) * values + (late - decay) * earlier
+    followed[0] += decay[0] * start
+    # x_i - decay_i x_{i-1} = followed_i: a triangle of two diagonals.
+    bands = np.vstack([np.ones(len(values)), np.append(-decay[1:, 0], 0.0)])
+    return np.asarray(dtbtrs(bands, followed, uplo="L", diag="U")[0])
 
 
 def lagged(time: Array, values: Array, time_constant: float, state: Any) -> tuple[Array, Any]:
