@@ -136,14 +136,16 @@ class Library:
         best: dict[tuple[str, int, int], Asked] = {}
         for place, every in enumerate(self._points):
             units = [np.array([rows for _, _, rows in points]) for points in every]
-            for (points, rows), (number, free) in product(
-                zip(every, units, strict=True), enumerate(DIRECTIONS)
+            known = [beyond.scores(rows, place, range(6)) for rows in units]
+            for (points, (information, slope)), (number, free) in product(
+                zip(every, known, strict=True), enumerate(DIRECTIONS)
             ):
-                gains, z = beyond.gains(rows, place, free)
+                own = list(free)
+                gains, z = best_of(information[:, :, own][..., own], slope[..., own])
                 first = 0
                 for form, run in groupby(form for form, _, _ in points):
-                    own = slice(first, first := first + sum(1 for _ in run))
-                    n = own.start + int(np.argmax(gains[own]))
+                    its = slice(first, first := first + sum(1 for _ in run))
+                    n = its.start + int(np.argmax(gains[its]))
                     gain = float(gains[n] - PRICES[len(free)] - np.log(len(form.shapes)))
                     key = form.name, place, number
                     if key not in best or best[key].gain < gain:
@@ -243,11 +245,11 @@ class Beyond:
 
     def gain(self, place: int, free: Sequence[int], rows: Array) -> tuple[float, Array]:
         """Return the gain of a form (r, u), and its unknowns (r, k)."""
-        gains, z = self.gains(rows[None], place, free)
+        gains, z = best_of(*self.scores(rows[None], place, free))
         return float(gains[0]), z[0]
 
-    def gains(self, rows: Array, place: int, free: Sequence[int]) -> tuple[Array, Array]:
-        """Return gains (n,) of log evidence and unknowns (n, r, k) of forms (n, r, u)."""
+    def scores(self, rows: Array, place: int, free: Sequence[int]) -> tuple[Array, Array]:
+        """Return information (n, r, k, r, k), slope (n, r, k) of forms (n, r, u), k axes free."""
         (n, r, u), k = rows.shape, len(free)
         information, slope = np.empty((n, r, k, r, k)), np.empty((n, r, k))
         for i, one in enumerate(free):
@@ -255,12 +257,17 @@ class Beyond:
             slope[..., i] = rows @ own
             for j, two in enumerate(free[i:], i):
                 known = (rows.reshape(-1, u) @ self._pair(place, one, two)).reshape(n, r, u)
-                both = np.einsum("nau,nbu->nab", known, rows)
+                both = known @ rows.swapaxes(1, 2)
                 information[:, :, i, :, j] = both
                 information[:, :, j, :, i] = both.swapaxes(1, 2)
-        flat = information.reshape(n, r * k, r * k), slope.reshape(n, r * k)
-        gains, z, _ = modes(*flat)
-        return gains, z.reshape(n, r, k)
+        return information, slope
+
+
+def best_of(information: Array, slope: Array) -> tuple[Array, Array]:
+    """Return gains (n,) of log evidence and unknowns (n, r, k) of forms, by their scores."""
+    n, r, k = slope.shape
+    gains, z, _ = modes(information.reshape(n, r * k, r * k), slope.reshape(n, r * k))
+    return gains, z.reshape(n, r, k)
 
 
 def _signals_at(fit: WristFit, number: int) -> dict[str, dict[str, Array]]:
