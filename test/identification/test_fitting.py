@@ -11,12 +11,14 @@ from wrist_stiffness.identification.free_effects import FreeEffect, commissionin
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.result import told_parameters
+from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.discrepancy import PASSING, PASSING_DRIFT, SLOW_DRIFT
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.report.fit_lines import used_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import AXES, GAPS
 from wrist_stiffness.sessions.unit_session import as_units
@@ -128,6 +130,24 @@ def test_registrations_of_a_millimetre_are_recovered_to_the_noise(model):
         assert each.sigma < 10.0
     assert not found.rough
     assert found.arrived
+
+
+def test_a_fit_that_stops_short_of_its_best_values_says_how_far(model, monkeypatch):
+    rng = np.random.default_rng(6)
+    session = measured(model, poses(rng), rng)
+    free = [free_all(effect(FRAME), per_session=True)]
+    found = fit(problem_of(model, [session], free))
+    assert not any("short of" in line for line in used_lines([session], found))
+    # At a kink no step gains anything.
+    monkeypatch.setattr(WristFit, "_moved", lambda self, noise, step: None)
+    z = found.z + 3.0 * found.covariance[0] / np.sqrt(found.covariance[0, 0])
+    base = replace(found.base, z=z, residual=found.problem.residual(z))
+    stuck = replace(found, base=base).settled()
+    # By the noise as stated, which need not be the one that was found.
+    assert stuck.off == pytest.approx(3.0, rel=0.3)
+    (line,) = [line for line in used_lines([session], stuck) if "short of" in line]
+    words = "standard uncertainties short of its best values: a contact opens or closes there"
+    assert line == f"the fit ended {stuck.off:.1f} {words}"
 
 
 @pytest.mark.slow

@@ -7,12 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.extend import direction_of
-from wrist_stiffness.identification import wrist_problem
+from wrist_stiffness.identification import wrist_diagnosis, wrist_problem
 from wrist_stiffness.identification.extension import extend
-from wrist_stiffness.identification.proposal import twins
+from wrist_stiffness.identification.proposal import Proposals, twins
 from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.identification.wrist_problem import WristProblem
+from wrist_stiffness.inference import search
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
@@ -188,6 +189,23 @@ def test_beside_an_effect_that_is_named_a_law_is_proposed_for_the_rest(model, da
     first, second = [line for line in lines if line.startswith("   wrist-stiffness")]
     assert first.endswith("extend m.yaml --effect backlash@motor_2 --fit day -o found_1.yaml")
     assert "extend found_1.yaml --formula 'size_um * clamp_bar'" in second
+
+
+def test_a_search_out_of_fits_is_followed_by_a_law_all_the_same(model, day, monkeypatch):
+    """Only one out of time is not."""
+    nothing = Proposals((), (), 0.0, {}, 0)
+    monkeypatch.setattr(
+        wrist_problem, "searched", lambda absent: [(find_law("backlash"), "motor_2")]
+    )
+    monkeypatch.setattr(wrist_diagnosis, "propose", lambda *asked: nothing)
+    monkeypatch.setattr(search, "MOST_FITS", 0)
+    play = effect_at(find_law("backlash"), "motor_2", {"width_mdeg": 70.0})
+    both = planted(
+        model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * clamp_bar", play, lift_um=2.0
+    )
+    found = diagnose_sessions(model, [both])
+    assert (found.diagnosis.ended, found.diagnosis.verdict) == (search.MANY_FITS, "unknown")
+    assert found.proposals is nothing
 
 
 def test_what_gives_under_its_own_load_is_told_by_the_load_through_it(model, day):

@@ -274,6 +274,27 @@ def test_what_makes_another_session_worse_is_not_handed_over(rng):
     assert kept.after["value_si"] == pytest.approx(np.sqrt(2.0), rel=0.3)
 
 
+@pytest.mark.parametrize("seed", [4, 12])
+def test_an_instrument_that_drifts_is_no_evidence_against_a_right_effect(seed):
+    """It drifts by as much as it scatters, slowly, as the conditions change."""
+    rng, n = np.random.default_rng(seed), 200
+    time = 10.0 * np.tile(np.arange(n), 2)
+    session = np.repeat([0, 1], n)
+    phase = np.concatenate(
+        [np.arange(n) / n * rng.uniform(0.5, 2.0) + rng.uniform() for _ in range(4)]
+    )
+    conditions = dict(zip("xz", np.sin(2.0 * np.pi * phase).reshape(2, -1), strict=True))
+    values = rng.normal(size=(2 * n, 2))
+    for own in (session == 0, session == 1):
+        size, start = rng.normal(size=(6, 2)), rng.uniform(0.0, 2.0 * np.pi, (6, 2))
+        speed = np.abs(rng.normal(size=(6, 2))) / (2.0 * n)
+        waves = np.sin(speed * time[own][:, None, None] + start)
+        values[own] += 1.1 * np.sum(size * waves, axis=1) / np.sqrt(3.0)
+    units = Observations(values, conditions, NOISE, time, session)
+    result = diagnose(planted(units, (LINEAR, 1.0)), (LINEAR, SQUARE, CROSS, SIGN), (ZERO,))
+    assert [each.why_not for each in result.standings if "held-out" in each.why_not] == []
+
+
 def test_another_session_is_set_up_anew_before_it_judges(rng):
     units = planted(table(rng, 120, session=np.repeat([0, 1], 60)), (CROSS, 4.0))
     moved = units.with_values(units.values + 50.0 * (units.sessions == 1)[:, None])
@@ -423,6 +444,30 @@ def test_what_a_rival_would_change_is_told_of_every_set_that_was_fitted(rng):
 
 def not_a_number(units, shape):
     return np.full((units.n_units, 2, 1), np.nan)
+
+
+@pytest.mark.parametrize("size", [1e6, 1e9])
+def test_set_up_that_is_there_twice_takes_up_what_one_does(rng, size):
+    twice = Nuisance("zeros", lambda t: t.covariate("x")[:, None, None] * [[1.0, -2.5], [0.0, 0.0]])
+    units = planted(table(rng), (CROSS, size), (LINEAR, size))
+    result = diagnose(units, (SQUARE, CROSS, SIGN), (ZERO, twice))
+    assert named(result) == {"cross@part"}
+    assert result.findings[0].parameters["size"][0] == pytest.approx(size, rel=0.02)
+
+
+@pytest.mark.parametrize("size", [1e9, 1e11])
+def test_a_table_far_above_its_noise_gets_an_answer(rng, size):
+    result = diagnose(planted(table(rng), (CROSS, size), (LINEAR, size)), (SQUARE, CROSS), (ZERO,))
+    assert result.verdict == "unknown"
+    result = diagnose(planted(table(rng), (CROSS, size)), LAWS, (ZERO,))
+    assert named(result) == {"cross@part"}
+
+
+def test_a_noise_of_nothing_is_refused_with_its_row(rng):
+    covariance = np.tile(NOISE, (80, 1, 1))
+    covariance[7, 1, 1] = 0.0
+    with pytest.raises(InputError, match="covariance of row 7: a variance of 0, must be above 0"):
+        diagnose(planted(table(rng, covariance=covariance)), LAWS, (ZERO,))
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,20 @@ def test_a_class_is_named_by_a_set_that_was_fitted(rng, kept):
     assert {each.name for each in standings(search, reading)} == set(search.promised)
 
 
+def test_what_is_handed_over_is_what_is_named(rng):
+    """Also where no fit came by it alone: beside others that nobody named, values are others."""
+    problem = Disappointing(rng, 1.0)
+    name, one, two, three = list(problem.slopes)[:4]
+    search = Search(problem)
+    for names in ((name, one, two), (name, three)):
+        state = search._known(problem.fitted(names), None)
+        search.states[state.names] = replace(state, log=search.base.log + 50.0)
+    reading = read(search)
+    assert [each.name for each in reading.named] == [name]
+    assert reading.state.names == {name}
+    assert reading.state.fit.point.z == pytest.approx(problem.fitted((name,)).point.z)
+
+
 def test_a_better_nominal_fit_is_asked_anew(rng):
     """What slopes promise counts from the nominal fit that they were taken about."""
 

@@ -1,10 +1,12 @@
 """Scatter that units of a stand share: against the dense covariance, and in fits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wrist_stiffness.inference.observations import Observations
-from wrist_stiffness.inference.shared import Apart, component_factors, own_covariance
+from wrist_stiffness.inference.shared import Apart, Whitened, component_factors, own_covariance
 
 STAND = np.array([0, 0, -1, 1, 1, 1, -1])
 
@@ -62,3 +64,26 @@ def test_unmeasured_components_are_left_out_of_the_coupling():
     covariance = np.array([[[4.0, 1.0], [1.0, 9.0]]])
     factor = component_factors(covariance, np.array([[True, False]]))
     np.testing.assert_allclose(factor[0], [[0.5, 0], [0, 1]])
+
+
+def test_units_that_are_taken_out_leave_the_others_as_if_never_measured(table):
+    common = np.random.default_rng(8).normal(size=(7, 3, 1))
+    whole = replace(table, common=common)
+    own = own_covariance(whole, whole.covariance)
+    units = Whitened(whole, own, np.ones((7, 1)))
+    aside = np.isin(np.arange(7), [1, 4])
+    taken = units.without(aside)
+    columns = np.random.default_rng(9).normal(size=(7, 3, 4))
+    white = taken(units.whiten(columns))
+    seen = (whole.measured & ~aside[:, None]).ravel()
+    flat, more = columns.reshape(21, 4)[seen], common.reshape(21, 1)[seen]
+    covariance = dense(table)[np.ix_(seen, seen)]
+    # What all have in common is whitened beside the units that have it.
+    alone = Whitened(
+        replace(whole, values=np.where(aside[:, None], np.nan, whole.values)), own, np.ones((7, 1))
+    )
+    assert white == pytest.approx(alone.whiten(columns), abs=1e-9)
+    exact = flat.T @ np.linalg.solve(covariance + more @ more.T, flat)
+    assert white.T @ white == pytest.approx(exact, rel=1e-9)
+    one = columns[:, :, 0]
+    assert taken(units.whiten(one)) == pytest.approx(white[:, 0])

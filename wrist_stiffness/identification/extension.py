@@ -52,6 +52,7 @@ class Extension:
     before: HeldOut
     after: HeldOut
     judged_by: str  # which those are
+    odds: float  # log odds by which these speak for the effect
 
     @cached_property
     def model(self) -> ErrorModel:
@@ -131,9 +132,9 @@ class Extension:
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
-        if refuted(self.before, self.after):
+        if refuted(self.odds):
             out.append("the error on the unseen part GROWS: leave this effect out")
-        elif not refuted(self.after, self.before):
+        elif not refuted(-self.odds):
             out.append("the error on the unseen part does not fall beyond chance")
         return tuple(out)
 
@@ -201,7 +202,8 @@ def extend(
         whole = fit_base(model, sessions_used, (), base.base, base=(free, held))
         base = WristFit(whole, problem.table)
     progress(STEPS, STEPS)
-    return Extension(effect, found, base, before, after, judge.by)
+    odds = judge.speak_for(grown, base)
+    return Extension(effect, found, base, before, after, judge.by, odds)
 
 
 def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:

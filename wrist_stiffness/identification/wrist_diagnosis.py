@@ -11,6 +11,7 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.base_fit import BaseFit, fit_base, fit_cleaned
 from wrist_stiffness.identification.candidates import compensable, turns_normal
 from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import require_units
 from wrist_stiffness.identification.proposal import Proposals
 from wrist_stiffness.identification.proposing import propose
@@ -128,8 +129,8 @@ def diagnose_sessions(
     search.run()
     reading = _settled(read(search, naming))
     tell("judging by what was held out")
-    judge = _Judged(model, units, search, reading.state.fit.base)
-    if reading.named and refuted(judge.before, judge.after):
+    judge = _Judged(model, units, search, reading.state.fit)
+    if reading.named and refuted(judge.odds):
         # What the held-out part speaks against is not handed over.
         judge.after, reading = judge.before, _settled(reading.refute(search.base))
     proposals = None
@@ -196,15 +197,20 @@ class _Judged:
     """An answer, judged by what was not seen."""
 
     def __init__(
-        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, near: BaseFit
+        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, found: WristFit
     ) -> None:
-        nominal: BaseFit = search.base.fit.base
+        nominal: WristFit = search.base.fit
+        near, effects = found.base, list(found.base.beyond().values())
         if len(whole) > len(nominal.problem.sessions):
-            nominal, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
-        self._model, self._judge, self._near = model, Judge(nominal), near
+            base, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
+            nominal = WristFit(base, likelihood_of(base))
+            beside = fit_base(model, base.problem.sessions, effects, near)
+            found = replace(found, base=beside, table=nominal.table)
+        self._model, self._judge, self._near = model, Judge(nominal.base), near
         self.scope = self._judge.by
         self.before = self._left([])
-        self.after = self._left(list(near.beyond().values()))
+        self.after = self._left(effects)
+        self.odds = self._judge.speak_for(found, nominal)
 
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
         """Return what is left by the model with some effects."""

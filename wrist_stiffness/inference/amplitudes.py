@@ -47,7 +47,7 @@ def evidence(point: Point, background: Background, near: Evidence | None = None)
     while background.whole is None:
         asked = {n: size for n, (gain, size) in further(at, background).items() if gain > 0.0}
         tried = _pruned(settled(beside(at, {**sizes_of(at), **asked}))) if asked else at
-        if tried.unbounded < at.unbounded + ENOUGH:
+        if not tried.unbounded > at.unbounded + ENOUGH:
             break
         at = tried
     at = _pruned(settled(at))

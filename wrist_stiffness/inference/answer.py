@@ -200,9 +200,7 @@ def read(search: Search, naming: float = NAMING) -> Reading:
     named = tuple(
         each for each in classes if each.probability >= naming and len(each.members) <= MOST_MEMBERS
     )
-    state = search.states.get(frozenset(each.name for each in named), best)
-    if not named:
-        state = search.base
+    state = search.only(frozenset(each.name for each in named))
     first, left = search.base.evidence.unexplained, state.evidence.unexplained
     share = min(left / first, 1.0) if first > 0.0 else float(left > 0.0)
     nothing = weights.get(frozenset(), 0.0) * (not search.base.rough)

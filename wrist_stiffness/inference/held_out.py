@@ -7,11 +7,15 @@ Of one session it is a part, without which what was found is fitted anew.  All o
 the effects, this part too: it judges their values, and hardly whether they are the right ones.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations, Quantity
+from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.search import NEGLIGIBLE
 
 HELD_OUT = 0.2
 """Part of the units that judges where there is one session only (assumed)."""
@@ -49,14 +53,6 @@ class HeldOut:
     """Residuals of a model on units that it has not seen."""
 
     residual: Array  # (n, m), in the units of the table; NaN = not measured
-    # (N,), whitened, without what the set-up of the session could still take up: where a wander or
-    # a registration goes after the end of the data is no evidence against an effect
-    white: Array
-
-    @property
-    def energy(self) -> float:
-        """Weighted sum of squares, in units of the noise."""
-        return float(self.white @ self.white)
 
     def rmse(self, quantity: Quantity) -> float:
         """Root mean square of the vector norm of a quantity; blanks do not count."""
@@ -74,15 +70,37 @@ class HeldOut:
         return np.where(measured.any(axis=1), total, np.nan)
 
 
-def refuted(before: HeldOut, after: HeldOut) -> bool:
-    """Whether an effect makes held-out units worse by more than chance explains.
+def speak_for(
+    found: Point, without: Point, background: Background, taken: Callable[[Array], Array]
+) -> float:
+    """Return by how much better a set foretells held-out units than the model without it.
 
-    The change f of the prediction gains 2 r f - f^2; with a right f its standard deviation is
-    2 |f|, so a loss beyond twice that is none of a right effect.
+    Log odds of what was measured in them, given the others: beside noise, drift and discrepancy as
+    the others show them beside the set, and all values as well as the others tell them.  A right
+    set foretells them k times worse in at most one table of k (Markov's inequality).
+
+    `found`, `without`: where fits to all units ended, with the set and without it; `background`: of
+    all; `taken`: takes the held-out units out of whitened rows.
     """
-    change = float(np.linalg.norm(before.white - after.white))
-    gain = before.energy - after.energy
-    return gain < -4 * change
+    groups = tuple(replace(each, columns=taken(each.columns)) for each in background.groups)
+    seen = evidence(_seen(found, taken), Background(groups, background.noise_width))
+    whole = replace(seen, background=background.part(seen.background.numbers))
+
+    def foretold(point: Point) -> float:
+        part = replace(seen, point=_seen(point, taken))
+        return replace(whole, point=point).unbounded - part.unbounded
+
+    return foretold(found) - foretold(without)
+
+
+def _seen(point: Point, taken: Callable[[Array], Array]) -> Point:
+    left, columns, inexact = (taken(each) for each in (point.left, point.columns, point.inexact))
+    return replace(point, left=left, columns=columns, inexact=inexact)
+
+
+def refuted(odds: float) -> bool:
+    """Whether held-out units speak against a set beyond what chance explains."""
+    return odds < -NEGLIGIBLE
 
 
 def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, float]:

@@ -223,6 +223,13 @@ class Search:
             )
         return max(states, key=lambda each: each.log)
 
+    def only(self, names: Names) -> State:
+        """Return the best fit of some effects of the best set, fitted where none was."""
+        state = self.states.get(names, self.best)
+        for name in sorted(state.names - names):
+            state = self._less(state, name)
+        return state
+
     def _deepened(self, state: State) -> State:
         """Add effects one after the other for as long as that pays."""
         while len(state.names) < self._most:

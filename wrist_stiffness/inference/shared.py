@@ -5,9 +5,12 @@ nothing of them, and their mean is no better than one of them.  Taken for indepe
 counts would both drown what a load does and make the mean look too good.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csr_array
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations
 
@@ -73,6 +76,13 @@ class Apart:
             flat -= directions @ (shrink * (directions.T @ flat))
         return white
 
+    def undone(self, white: Array) -> Array:
+        """Return the columns (n, m, k) that became these."""
+        flat = white.reshape(white.shape[0] * white.shape[1], white.shape[2]).copy()
+        for directions, shrink in reversed(self._parts):
+            flat += directions @ (shrink / (1.0 - shrink) * (directions.T @ flat))
+        return np.asarray(np.linalg.solve(self._factors, flat.reshape(white.shape)))
+
     def rows(self, values: Array) -> Array:
         """Return (n, m) or (n, m, k) as rows of unit scatter, (n m,) or (n m, k); NaN become 0."""
         columns = values if values.ndim == 3 else values[:, :, None]
@@ -92,11 +102,20 @@ def component_factors(covariance: Array, measured: Mask) -> Array:
     `covariance` (n, m, m): covariance of each unit; `measured` (n, m): unmeasured components get a
     unit diagonal and no coupling.
     Returns L^-1 (n, m, m) with L L^T = covariance.
+
+    Raises `InputError` with the row and its least variance in any direction if that is not above 0.
     """
     m = covariance.shape[1]
     both = measured[:, :, None] & measured[:, None, :]
     safe = np.where(both, covariance, np.eye(m))
-    return np.linalg.inv(np.linalg.cholesky(safe)).astype(np.float64)
+    try:
+        return np.linalg.inv(np.linalg.cholesky(safe)).astype(np.float64)
+    except np.linalg.LinAlgError:
+        least = np.linalg.eigvalsh(safe)[:, 0]
+        row = int(np.argmin(least))
+        raise InputError(
+            f"covariance of row {row}: a variance of {least[row]:.3g}, must be above 0"
+        ) from None
 
 
 class Whitened:
@@ -110,7 +129,8 @@ class Whitened:
 
     def __init__(self, observations: Observations, own: Array, alike: Array) -> None:
         self.observations, self._alike = observations, alike
-        self._apart = Apart(observations, component_factors(own, observations.measured))
+        self._factors = component_factors(own, observations.measured)
+        self._apart = Apart(observations, self._factors)
         self._rows = np.flatnonzero(observations.measured.ravel())
 
     @property
@@ -121,6 +141,20 @@ class Whitened:
     def whiten(self, values: Array) -> Array:
         """Return (n, m) or (n, m, k) as rows of unit scatter, (N,) or (N, k)."""
         return self._apart.rows(values)[self._rows]
+
+    def without(self, aside: Mask) -> Callable[[Array], Array]:
+        """Return what makes of rows (N,) or (N, k) those as if some units were not measured."""
+        table = self.observations
+        blank = table.with_values(np.where(aside[:, None], np.nan, table.values))
+        apart, kept = Apart(blank, self._factors), np.flatnonzero(blank.measured.ravel())
+
+        def taken(rows: Array) -> Array:
+            flat = np.zeros((table.values.size, *rows.shape[1:]))
+            flat[self._rows] = rows
+            raw = self._apart.undone(flat.reshape(*table.values.shape, -1))
+            return apart.rows(raw)[kept].reshape(len(kept), *rows.shape[1:])
+
+        return taken
 
     def varied(self, change: Array) -> Array:
         """Return what a change (n, m) adds where its size changes with the conditions, (N, l)."""

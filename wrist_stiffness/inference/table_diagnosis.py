@@ -22,7 +22,7 @@ from wrist_stiffness.inference.answer import (
     standings,
 )
 from wrist_stiffness.inference.candidates import Candidate, Nuisance, nuisance_columns
-from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted, speak_for
 from wrist_stiffness.inference.linear import LinearFit, LinearProblem
 from wrist_stiffness.inference.noise import in_each_component
 from wrist_stiffness.inference.observations import Array, Mask, Observations
@@ -130,7 +130,7 @@ def diagnose(
     tell("judging by what was held out")
     judge = _Judge(problem, whole, aside, nuisances, _noise(reading.state, problem.table))
     before, after = judge.left(search.base.fit), judge.left(reading.state.fit)
-    refused = bool(reading.named) and refuted(before, after)
+    refused = bool(reading.named) and judge.refutes(search.base.fit, reading.state.fit)
     if refused:
         after = before
         reading = reading.refute(search.base)
@@ -192,7 +192,7 @@ def _spread(whole: Observations) -> Mask:
 
 
 class _Judge:
-    """Fits to what was seen, judged by what was not, in units of one noise."""
+    """Fits to what was seen, judged by what was not."""
 
     def __init__(
         self,
@@ -202,19 +202,25 @@ class _Judge:
         nuisances: Sequence[Nuisance],
         variance: Array,
     ) -> None:
-        self._problem, self._nuisances = problem, nuisances
-        self._size = np.sqrt(variance)
+        self._nuisances, self._size = nuisances, np.sqrt(variance)
         alone = not aside.any()
         if alone:
-            aside, laws = _spread(whole), list(problem.laws.values())
-            self._problem = LinearProblem(
-                whole.take(~aside), laws, nuisances, problem.table.ordered
-            )
-        self._unseen = whole.take(aside)
+            aside = _spread(whole)
+        laws, other = list(problem.laws.values()), whole.take(~aside) if alone else whole
+        second = LinearProblem(other, laws, nuisances, problem.table.ordered)
+        self._problem, self._all = (second, problem) if alone else (problem, second)
+        self._aside, self._unseen = aside, whole.take(aside)
         free = nuisance_columns(self._unseen, tuple(nuisances))
         new = [session is not None and not alone for _, session, _ in free.keys]
         self._set_up = free.columns[:, :, new]
         self._prior = free.prior_std[new]
+
+    def refutes(self, nominal: LinearFit, found: LinearFit) -> bool:
+        """Tell whether what was not seen speaks against a set."""
+        problem = self._all
+        with_it, without = (problem.fitted(each.terms).point for each in (found, nominal))
+        taken = problem.table.without(self._aside)
+        return refuted(speak_for(with_it, without, problem.background, taken))
 
     def left(self, found: LinearFit, without: str = "") -> HeldOut:
         """Return what a set, or that without an effect, leaves of the unseen units.
@@ -232,7 +238,7 @@ class _Judge:
         target = (residual / self._size).ravel()[rows]
         gram = flat.T @ flat + np.diag(1.0 / self._prior**2)
         set_up = np.linalg.lstsq(gram, flat.T @ target, rcond=1e-12)[0]
-        return HeldOut(residual - self._set_up @ set_up, target - flat @ set_up)
+        return HeldOut(residual - self._set_up @ set_up)
 
 
 def _noise(state: State, table: Table) -> Array:

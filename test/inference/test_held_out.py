@@ -1,0 +1,58 @@
+"""What held-out units say of a set: the log odds of two multivariate normal densities."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from wrist_stiffness.inference.amplitudes import evidence
+from wrist_stiffness.inference.held_out import refuted, speak_for
+from wrist_stiffness.inference.point import Background, Group, Point
+
+N, HELD = 40, 12
+
+
+def point(left, columns):
+    empty = np.zeros((N, 0))
+    z, weight = np.zeros(columns.shape[1]), np.ones(columns.shape[1])
+    return Point(left, -columns, z, weight, {}, empty, linear=True)
+
+
+def taken(rows):
+    return rows[: N - HELD]
+
+
+def foretold(covariance, left):
+    """Log density of the held-out numbers given the others."""
+    part = covariance[: N - HELD, : N - HELD]
+    whole = multivariate_normal(cov=covariance).logpdf(left)
+    return whole - multivariate_normal(cov=part).logpdf(left[: N - HELD])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_odds_are_those_of_the_densities_given_what_was_seen(seed):
+    rng = np.random.default_rng(seed)
+    columns = rng.normal(size=(N, 3)) * [10.0, 10.0, 2.0]
+    wander = np.linalg.cholesky(np.exp(-np.abs(np.subtract.outer(range(N), range(N))) / 10.0))
+    left = columns @ rng.normal(size=3) + 1.5 * wander @ rng.normal(size=N) + rng.normal(size=N)
+    ground = Background((Group("drift", "s", wander, 0.5),), 0.2)
+    found, without = point(left, columns), point(left, columns[:, :2])
+    groups = (Group("drift", "s", taken(wander), 0.5),)
+    part = point(left, columns)
+    part = Point(
+        *(taken(a) for a in (part.left, part.columns)),
+        part.z,
+        part.weight,
+        {},
+        taken(part.inexact),
+        linear=True,
+    )
+    seen = evidence(part, Background(groups, 0.2))
+    beside = seen.excess * np.eye(N) + seen.amplitude[0] ** 2 * wander @ wander.T
+    exact = [foretold(beside + own @ own.T, left) for own in (columns, columns[:, :2])]
+    odds = speak_for(found, without, ground, taken)
+    assert odds == pytest.approx(exact[0] - exact[1], abs=1e-6)
+
+
+def test_what_is_foretold_worse_by_chance_is_not_refuted():
+    assert not refuted(-2.5)
+    assert refuted(-3.5)
