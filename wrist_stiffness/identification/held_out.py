@@ -67,8 +67,7 @@ class Judge:
         return self._held_out(problem, problem.residual(np.empty(0)))
 
     def _held_out(self, problem: FitProblem, residual: Array) -> HeldOut:
-        shown = without_mounting(problem.table, residual)[self.aside]
-        return HeldOut(shown)
+        return HeldOut(without_mounting(problem.table, residual)[self.aside])
 
     def speak_for(self, found: WristFit, without: WristFit) -> float:
         """Return by how much better effects foretell the held-out units: see `speak_for` there.

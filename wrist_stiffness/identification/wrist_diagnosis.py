@@ -200,23 +200,32 @@ class _Judged:
         self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, found: WristFit
     ) -> None:
         nominal: WristFit = search.base.fit
-        near, effects = found.base, list(found.base.beyond().values())
-        if len(whole) > len(nominal.problem.sessions):
+        self._all = len(whole) == len(nominal.problem.sessions)
+        if not self._all:
             base, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
             nominal = WristFit(base, likelihood_of(base))
-            beside = fit_base(model, base.problem.sessions, effects, near)
-            found = replace(found, base=beside, table=nominal.table)
-        self._model, self._judge, self._near = model, Judge(nominal.base), near
+        self._model, self._nominal, self._found = model, nominal, found
+        self._judge = Judge(nominal.base)
         self.scope = self._judge.by
+        self._effects = list(found.base.beyond().values())
         self.before = self._left([])
-        self.after = self._left(effects)
-        self.odds = self._judge.speak_for(found, nominal)
+        self.after = self._left(self._effects) if self._effects else self.before
+
+    @property
+    def odds(self) -> float:
+        """By how much better the answer foretells what was not seen than the nominal model."""
+        found, nominal = self._found, self._nominal
+        if not self._all:
+            sessions = nominal.problem.sessions
+            beside = fit_base(self._model, sessions, self._effects, found.base)
+            found = replace(found, base=beside, table=nominal.table)
+        return self._judge.speak_for(found, nominal)
 
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
         """Return what is left by the model with some effects."""
         judge = self._judge
         # A pin that rests where it does leads back there; from the nominal model it may not.
-        near = self._near if effects else judge.whole
+        near = self._found.base if effects else judge.whole
         return judge.left(fit_base(self._model, judge.seen, effects, near))
 
     def without(self, fitted: BaseFit, name: str) -> HeldOut:
