@@ -12,7 +12,7 @@ import numpy as np
 
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.identification.calibration import CALIBRATED
-from wrist_stiffness.model.contribution import LEFT_OUT
+from wrist_stiffness.model.contribution import left_out
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256
 from wrist_stiffness.progress import Progress, silent
@@ -117,8 +117,8 @@ def _without_signal(session: MeasuredSession, models: Sequence[ErrorModel]) -> l
     """
     first = session.block.take(slice(0, 1))
     first = replace(first, theta=np.zeros((1, 2)), load=np.zeros((1, 6)))
-    warnings = (warning for model in models for warning in model.batch(first).warnings)
-    return list(dict.fromkeys(each for each in warnings if each.endswith(LEFT_OUT)))
+    lacking = (lack for model in models for lack in model.batch(first).lacking.items())
+    return [left_out(*lack) for lack in dict.fromkeys(lacking)]
 
 
 def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:
