@@ -168,6 +168,13 @@ def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong()
     ]
 
 
+def test_a_wrist_that_is_given_twice_is_no_fleet(tmp_path, capsys):
+    names = [str(DATA / name) for name in ("wrist_a.mcap", "wrist_b.mcap", "wrist_a.mcap")]
+    assert main(["compare", *names, "--each"]) == 2
+    said = "wrist_a.mcap: given more than once; each is a wrist of its own"
+    assert said in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("error", ["b/c.mcap: no pose", "b/c.mcap no pose", "no pose"])
 def test_a_fleet_names_each_recording_once(error):
     rows = (Answer(Path("b/c.mcap"), None, error),)

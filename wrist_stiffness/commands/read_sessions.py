@@ -67,12 +67,11 @@ def read_sessions(
     WristError
         If a recording cannot be used.
     """
-    paths = recordings_in(recordings.paths)
-    given = Counter(path for each in recordings.paths for path in recordings_in([each]))
+    given = recordings_in(recordings.paths)
     found: dict[Path, MeasuredSession] = {}
     first: dict[str, Path] = {}
-    for done, path in enumerate(paths):
-        progress(done, len(paths))
+    for done, path in enumerate(given):
+        progress(done, len(given))
         table, settings = models[0].table, recordings.settings
         session = read_session(path, table, remaps=recordings.topics, settings=settings)
         same = first.setdefault(measured_sha256(session), path)
@@ -84,7 +83,7 @@ def read_sessions(
         else:
             said = f"{path} holds the same measurements: used once"
             found[same] = _with_remarks(found[same], [said])
-    progress(len(paths), len(paths))
+    progress(len(given), len(given))
     names = Counter(session.name for session in found.values())
     named = {
         path: session if names[session.name] == 1 else replace(session, name=str(path))
