@@ -117,6 +117,15 @@ def test_contents_say_what_a_recording_holds(model, sessions):
     assert second.registered["s_um"] < 0.1 * analysis.versions[0].held_out["s_um"]
 
 
+def test_lines_end_where_nothing_was_measured(model, sessions):
+    time = sessions[0].block.time - sessions[0].block.time[0]
+    first = sessions[0].take((time < 20.0) | (time > 30.0))
+    view = Analysis(model, [first, sessions[1]]).view()
+    of_first = int(np.sum(view.left.sessions == 0))
+    at = view.left.times[:of_first] - first.block.time[0]
+    assert list(view.breaks) == [np.searchsorted(at, 25.0), of_first]
+
+
 def test_what_is_cancelled_changes_nothing(model, sessions):
     def cancelling(done, total):
         analysis.cancel()

@@ -36,7 +36,7 @@ from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagn
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.answer import NAMING
-from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.observations import Labels, Observations
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -50,6 +50,10 @@ from wrist_stiffness.sessions.contents import Contents, contents_of
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import SET_UP, names_of
 from wrist_stiffness.sessions.unit_session import all_units
+
+GAP_S = 1.0
+"""Time without a measurement over which a picture draws no line: moments of one motion that follow
+each other are half as far apart."""
 
 
 class Cancelled(WristError):
@@ -119,11 +123,14 @@ class View:
         Error of the pose by this version, without the set-up of instrument and motors [m, rad].
     noise : dict of str to float
         Noise of one unit and drift of the instrument, RMS by the key of the quantity.
+    breaks : (b,) int
+        Units before which nothing was measured for a second, or another session begins.
     """
 
     left: Observations
     predicted: Array
     noise: Mapping[str, float]
+    breaks: Labels
 
     @property
     def measured(self) -> Array:
@@ -197,13 +204,17 @@ class Analysis:
         number : int
             Place among the versions, the newest by default.
         """
-        fit, shown, predicted = self._fit(number), self._shown, []
+        fit, shown, predicted, spans = self._fit(number), self._shown, [], []
         for n, session in enumerate(shown.sessions):
             model = fit.base.model(n)
             own = tuple(each for each in model.effects if each.name not in names_of(SET_UP))
             predicted.append(model.predicted([own])[0][session.measured])
+            spans.append(session.span[session.measured])
         left = shown.table.with_values(self._left(fit.base))
-        return View(left, np.concatenate(predicted), fit.table.noise_and_drift(fit.evidence))
+        first, last = np.concatenate(spans).T
+        apart = (first[1:] - last[:-1] > GAP_S) | (np.diff(left.sessions) != 0)
+        noise = fit.table.noise_and_drift(fit.evidence)
+        return View(left, np.concatenate(predicted), noise, 1 + np.flatnonzero(apart))
 
     def contents(self) -> tuple[Contents, ...]:
         """Return what each recording holds, the instrument registered by the model as given."""

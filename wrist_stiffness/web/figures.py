@@ -158,7 +158,7 @@ def error_map(shown: Shown, border: Array) -> Figure:
 def time_line(shown: Shown) -> Figure:
     """Return measured and predicted error over time, and what is left below."""
     view, table = shown.view, shown.view.left
-    time, breaks = minutes(table), 1 + np.flatnonzero(np.diff(table.sessions))
+    time, breaks = minutes(table), view.breaks
     measured, predicted = shown.part(view.measured), shown.part(view.predicted)
     left = shown.part(table.values)
     traces = [
@@ -256,11 +256,13 @@ def _dots(x: Array, y: Array, name: str, colour: str, shown: Shown, size: int = 
 def _line(x: Array, y: Array, name: str, colour: str, breaks: Sequence[int] | Labels) -> Figure:
     return {
         "type": _kind(len(x)),
-        "mode": "lines",
+        # A pose between two gaps has no line.
+        "mode": "lines+markers" if len(breaks) else "lines",
         "name": name,
         "x": np.insert(x, breaks, np.nan),
         "y": np.insert(y, breaks, np.nan),
         "line": {"color": colour, "width": 1.5},
+        "marker": {"color": colour, "size": 3},
     }
 
 
