@@ -159,6 +159,8 @@ def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
     lines = diagnosis_lines(told)
     assert lines[:2] == [MISTAKE, ""]
     assert lines[2].startswith("Missing in the model")
+    # The page says what to record for each.
+    assert "  creep (2 places). What to record for each: --report or --json." in lines
     assert told.as_values()["set_up_mistake"] == MISTAKE
 
 
