@@ -29,6 +29,7 @@ from wrist_stiffness.report.page import (
     provenance_section,
 )
 from wrist_stiffness.report.pictures.errors import Bars, draw_against, draw_bars
+from wrist_stiffness.sessions.observing import without_mounting
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.diagnose import Diagnosed
@@ -208,8 +209,9 @@ def _depends(found: Diagnosed, left: Explained) -> list[Part]:
         return [told]
     series = []
     if found.result.findings:
-        after = left.observations.with_values(found.answer.fitted.residual)
-        series.append(("with the findings", after))
+        table = left.observations
+        after = without_mounting(table, found.answer.fitted.residual)
+        series.append(("with the findings", table.with_values(after)))
     caption = (
         "What the refitted base leaves against the conditions that show it best, everything else "
         "that was found taken out: every dwell and half second in motion, and the fitted law with "
