@@ -36,7 +36,7 @@ from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagn
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.answer import NAMING
-from wrist_stiffness.inference.observations import Labels, Observations
+from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -51,10 +51,6 @@ from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import without_mounting
 from wrist_stiffness.sessions.refitted import SET_UP, names_of
 from wrist_stiffness.sessions.unit_session import all_units
-
-GAP_S = 1.0
-"""Time without a measurement over which a picture draws no line: moments of one motion that follow
-each other are half as far apart."""
 
 
 class Cancelled(WristError):
@@ -125,14 +121,14 @@ class View:
         and motors [m, rad].
     noise : dict of str to float
         Noise of one unit and drift of the instrument, RMS by the key of the quantity.
-    breaks : (b,) int
-        Units before which nothing was measured for a second, or another session begins.
+    span : (u, 2) float
+        First and last moment of each unit [s].
     """
 
     left: Observations
     predicted: Array
     noise: Mapping[str, float]
-    breaks: Labels
+    span: Array
 
     @property
     def measured(self) -> Array:
@@ -213,10 +209,8 @@ class Analysis:
             predicted.append(session.seen(model.predicted([own])[0])[session.measured])
             spans.append(session.span[session.measured])
         left = shown.table.with_values(self._left(fit.base))
-        first, last = np.concatenate(spans).T
-        apart = (first[1:] - last[:-1] > GAP_S) | (np.diff(left.sessions) != 0)
         noise = fit.table.noise_and_drift(fit.evidence)
-        return View(left, np.concatenate(predicted), noise, 1 + np.flatnonzero(apart))
+        return View(left, np.concatenate(predicted), noise, np.concatenate(spans))
 
     def contents(self) -> tuple[Contents, ...]:
         """Return what each recording holds, the instrument registered by the model as given."""
