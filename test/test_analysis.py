@@ -11,6 +11,7 @@ from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
+from wrist_stiffness.web.figures import over_time
 
 PLAY = "backlash@motor_2"
 
@@ -115,6 +116,21 @@ def test_contents_say_what_a_recording_holds(model, sessions):
     assert first.force[1] > 0.5
     # Before the instrument is registered the error is where it happens to stand.
     assert second.registered["s_um"] < 0.1 * analysis.versions[0].held_out["s_um"]
+
+
+def test_lines_end_where_nothing_was_measured_and_are_level_over_a_dwell(model, sessions):
+    time = sessions[0].block.time - sessions[0].block.time[0]
+    first = sessions[0].take((time < 20.0) | (time > 30.0))
+    view = Analysis(model, [first, sessions[1]]).view()
+    x, y = over_time(view, np.arange(float(view.left.n_units)))
+    gap, night = np.flatnonzero(np.isnan(y))
+    assert 9.0 < 60.0 * (x[gap + 1] - x[gap - 1]) < 11.0
+    assert view.left.sessions[int(y[night - 1])] == 0
+    assert view.left.sessions[int(y[night + 1])] == 1
+    longest = int(np.argmax(np.ptp(view.span, axis=1)))
+    held_min = np.ptp(view.span[longest]) / 60.0
+    assert held_min > 1.0 / 60.0
+    assert np.ptp(x[y == longest]) == pytest.approx(held_min)
 
 
 def test_what_is_cancelled_changes_nothing(model, sessions):

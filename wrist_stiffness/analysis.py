@@ -48,6 +48,7 @@ from wrist_stiffness.planning.timeline import as_experiment
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.contents import Contents, contents_of
 from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.observing import without_mounting
 from wrist_stiffness.sessions.refitted import SET_UP, names_of
 from wrist_stiffness.sessions.unit_session import all_units
 
@@ -115,19 +116,23 @@ class View:
     ----------
     left : Observations
         Measured less predicted once set-up and tolerances are fitted, and the conditions.
-    predicted : (u, 6) float
-        Error of the pose by this version, without the set-up of instrument and motors [m, rad].
+    predicted : (u, m) float
+        Error of the pose by this version, or of what gauges read, without the set-up of instrument
+        and motors [m, rad].
     noise : dict of str to float
         Noise of one unit and drift of the instrument, RMS by the key of the quantity.
+    span : (u, 2) float
+        First and last moment of each unit [s].
     """
 
     left: Observations
     predicted: Array
     noise: Mapping[str, float]
+    span: Array
 
     @property
     def measured(self) -> Array:
-        """Measured error of the pose, the set-up taken out, (u, 6) [m, rad]."""
+        """Measured error of the same, the set-up taken out, (u, m) [m, rad]."""
         return np.asarray(self.left.values + self.predicted)
 
 
@@ -197,18 +202,20 @@ class Analysis:
         number : int
             Place among the versions, the newest by default.
         """
-        fit, shown, predicted = self._fit(number), self._shown, []
+        fit, shown, predicted, spans = self._fit(number), self._shown, [], []
         for n, session in enumerate(shown.sessions):
             model = fit.base.model(n)
             own = tuple(each for each in model.effects if each.name not in names_of(SET_UP))
-            predicted.append(model.predicted([own])[0][session.measured])
+            predicted.append(session.seen(model.predicted([own])[0])[session.measured])
+            spans.append(session.span[session.measured])
         left = shown.table.with_values(self._left(fit.base))
-        return View(left, np.concatenate(predicted), fit.table.noise_and_drift(fit.evidence))
+        noise = fit.table.noise_and_drift(fit.evidence)
+        return View(left, np.concatenate(predicted), noise, np.concatenate(spans))
 
     def contents(self) -> tuple[Contents, ...]:
         """Return what each recording holds, the instrument registered by the model as given."""
         base = self._problem(0).begin().base
-        table, squares, found = base.problem.table, np.nan_to_num(base.residual) ** 2, []
+        table, squares, found = base.problem.table, np.nan_to_num(self._left(base)) ** 2, []
         for n, each in enumerate(zip(self.sessions, base.problem.sessions, strict=True)):
             own = table.sessions == n
             found.append(contents_of(*each, table.take(own).rms(squares[own])))
@@ -380,11 +387,12 @@ class Analysis:
         return self._problem(0).begin().base.problem
 
     def _left(self, fitted: BaseFit) -> Array:
-        """Return what a fit leaves of the units that are shown, (u, 6) [m, rad]."""
-        pairs = zip(self._shown.sessions, fitted.problem.sessions, strict=True)
-        if all(np.array_equal(one.measured, two.measured) for one, two in pairs):
-            return fitted.residual
-        return replace(fitted.problem, sessions=self._shown.sessions).residual(fitted.z)
+        """Return what a fit leaves of the units that are shown, (u, m) [m, rad]."""
+        shown, left = self._shown, fitted.residual
+        pairs = zip(shown.sessions, fitted.problem.sessions, strict=True)
+        if not all(np.array_equal(one.measured, two.measured) for one, two in pairs):
+            left = replace(fitted.problem, sessions=shown.sessions).residual(fitted.z)
+        return without_mounting(shown.table, left)
 
     def _watched(self, hears: Callable[..., None]) -> Callable[..., None]:
         """Return who is told, so that what is being done ends once that was cancelled."""

@@ -15,10 +15,14 @@ def require_room(path: str | Path) -> None:
     """Refuse a path beside which no file can be written, before the work for it.
 
     `path`: file that `replacing` will write later; a device or a pipe needs no room.  Raises
-    `InputError` if its folder takes no file: permissions alone do not tell, of a disk that is
-    read-only.
+    `InputError` if it is a folder, or its folder does not exist or takes no file: permissions alone
+    do not tell, of a disk that is read-only.
     """
     target = Path(path)
+    if target.is_dir():
+        raise InputError(f"{path}: cannot be written: it is a folder")
+    if not target.absolute().parent.is_dir():
+        raise InputError(f"{path}: folder {target.parent} does not exist")
     if target.exists() and not target.is_file():
         return
     try:

@@ -38,6 +38,7 @@ def _run(output: str, seconds: float) -> int:
     from picture import draw_demo
     from run_demo import FAULT, run_demo
 
+    from wrist_stiffness.comparing.sentences import percent
     from wrist_stiffness.shipped import shipped_file
 
     model = shipped_file("config/palmieri2015_model.yaml")
@@ -60,8 +61,7 @@ def _run(output: str, seconds: float) -> int:
     hidden = f"{FAULT.effect}@{FAULT.component}, {millidegrees * FAULT.magnitude:.0f} mdeg"
     print(f"\n2. A fault was hidden in the wrist ({hidden}). The model does not know it.")
     for finding in fault.diagnosis.findings:
-        sure = min(100.0 * finding.probability, 99.9)
-        print(f"  missing: {' or '.join(finding.names)}, at least {sure:.1f} % sure")
+        print(f"  missing: {' or '.join(finding.names)}, {percent(finding.probability)} sure")
     if fault.after is None or fault.after.added is None:
         print(f"  verdict: {fault.diagnosis.verdict}")
     else:

@@ -9,6 +9,7 @@ import numpy as np
 from before_after import Pass, rms
 from run_demo import DemoResult, Fault
 
+from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure, save_figure
 
 CANDIDATES = 5
@@ -57,8 +58,7 @@ def _draw_finding(plot: Any, fault: Fault) -> None:
     names = [each.name.replace("@", "\n") for each in best]
     shares = [100.0 * each.probability for each in best]
     bars = plot.barh(names, shares, color=colour(2))
-    texts = [f"{share:.1f} %" if share < 99.95 else "> 99.9 %" for share in shares]
-    plot.bar_label(bars, texts, padding=3)
+    plot.bar_label(bars, [percent(each.probability) for each in best], padding=3)
     plot.invert_yaxis()
     plot.set_xlim(0.0, 130.0)
     plot.set_xticks([0, 50, 100])

@@ -284,7 +284,7 @@ def test_sigterm_cleans_up_and_ends_with_its_code(tmp_path):
     [
         ("joint_clearance@joint_9", "joint_clearance is at joint_1, joint_2"),
         ("backlash", "backlash is at motor_1, motor_2 only; write backlash@motor_1"),
-        ("joint_clearence@joint_3", "did you mean joint_clearance? (all: docs/hidden-effects.md)"),
+        ("joint_clearence@joint_3", "did you mean joint_clearance? known are a"),
         ("backlash@motor_1:doubled", "backlash has the forms single"),
     ],
 )

@@ -99,7 +99,7 @@ def test_what_is_left_asks_for_a_wrong_sign(tmp_path, capsys):
 def test_the_output_folder_is_looked_for_before_the_work(tmp_path, capsys):
     missing = tmp_path / "nowhere" / "m.yaml"
     assert main(["calibrate", "--fit", str(tmp_path / "x.mcap"), "-o", str(missing)]) == 2
-    assert "there is no folder" in capsys.readouterr().err
+    assert "does not exist" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("places", [("/proc/m.yaml", "x.json"), ("m.yaml", "/proc/x.json")])

@@ -91,6 +91,15 @@ def test_a_cut_recording_is_told_beside_the_verdict(tmp_path, capsys):
     assert printed.index("the recording is damaged") < printed.index("How far off")
 
 
+def test_words_about_damage_do_not_make_a_recording_damaged(tmp_path, capsys):
+    whole = DATA / "tutorial" / "thursday.mcap"
+    copy = shutil.copy(whole, tmp_path / "friday: the recording is damaged.mcap")
+    assert main(["compare", str(whole), str(copy)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("the recording is damaged.mcap holds the same") == 1
+    assert printed.index("How far off") < printed.index("the recording is damaged.mcap")
+
+
 def test_a_model_as_drawn_that_fails_is_to_be_calibrated_first(compared, tmp_path):
     told = "was never fitted to a wrist"
     printed, values, _ = compared
@@ -157,6 +166,13 @@ def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong()
         "b",
         "not compared: no recording",
     ]
+
+
+def test_a_wrist_that_is_given_twice_is_no_fleet(tmp_path, capsys):
+    names = [str(DATA / name) for name in ("wrist_a.mcap", "wrist_b.mcap", "wrist_a.mcap")]
+    assert main(["compare", *names, "--each"]) == 2
+    said = "wrist_a.mcap: given more than once; each is a wrist of its own"
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("error", ["b/c.mcap: no pose", "b/c.mcap no pose", "no pose"])

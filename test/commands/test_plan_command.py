@@ -10,6 +10,10 @@ from rosbags.highlevel import AnyReader
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.inference.answer import Diagnosis, Finding, NotExcited
 from wrist_stiffness.planning import pool
+from wrist_stiffness.planning.aims import Answer
+from wrist_stiffness.planning.information import Goal
+from wrist_stiffness.planning.plan import Plan
+from wrist_stiffness.report.plan import plan_summary
 
 LOADS = """
 schema: 1
@@ -119,6 +123,18 @@ def test_table_summary_picture_and_json_belong_together(folder, rows):
     assert loaded
     assert all(any(float(row[f"f{axis}_N"]) for axis in "xyz") for row in loaded)
     assert float(rows[-1]["time_s"]) < values["duration_s"]
+
+
+def test_what_many_rivals_leave_open_is_a_line_for_each_truth():
+    rivals = {"creep@joint_1": 0.5, "backlash@motor_1": 0.25, "": 0.75}
+    answers = tuple(Answer(Goal("inertia@platform", r), d, True) for r, d in rivals.items())
+    lines = plan_summary(Plan(None, (), answers[:2], {}, {})).splitlines()[-1:]
+    lines += plan_summary(Plan(None, (), answers[2:], {}, {})).splitlines()[-1:]
+    assert lines == [
+        "  inertia@platform if true, against backlash@motor_1 and 1 more: 0.2 standard deviations, "
+        "right in 55 %",
+        "  inertia@platform against nothing: 0.8 standard deviations",
+    ]
 
 
 def test_an_existing_folder_is_refused_before_any_work(folder, capsys):

@@ -19,6 +19,7 @@ from wrist_stiffness.inference import Diagnosis, Finding, Observations
 from wrist_stiffness.inference.answer import NotExcited, Standing
 from wrist_stiffness.report.diagnosis_report import diagnosis_lines, report_of_diagnosis
 from wrist_stiffness.report.page import html_of
+from wrist_stiffness.report.pictures.errors import draw_against
 from wrist_stiffness.sessions.unit_session import QUANTITIES
 from wrist_stiffness.shipped import shipped_file
 
@@ -150,6 +151,19 @@ def test_everything_of_a_finding_is_on_the_page(observations):
     assert re.search(r"log evidence against the model without it\W+td\W+td\W+\+123", page)
 
 
+def test_what_mountings_of_gauges_do_is_not_drawn(observations, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(
+        "wrist_stiffness.report.diagnosis_report.draw_against",
+        lambda told, series: drawn.append(series) or draw_against(told, series),
+    )
+    n, mounting = observations.n_units, 1e-3 * np.eye(6)[:, 2:3]
+    gauged = replace(observations, common=np.tile(mounting, (n, 1, 1)))
+    page_of(RESULT, replace(gauged, values=gauged.values + 0.1 * mounting[:, 0]))
+    ((_, after),) = drawn[0]
+    assert abs(after.values[:, 2].mean()) < 1e-9
+
+
 def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
     """No effect is as large, and whatever is named stands in for it."""
     page = page_of(RESULT, observations, mistake=MISTAKE)
@@ -159,6 +173,8 @@ def test_a_mistake_of_the_set_up_is_told_before_any_effect(observations):
     lines = diagnosis_lines(told)
     assert lines[:2] == [MISTAKE, ""]
     assert lines[2].startswith("Missing in the model")
+    # The page says what to record for each.
+    assert "  creep (2 places). What to record for each: --report or --json." in lines
     assert told.as_values()["set_up_mistake"] == MISTAKE
 
 

@@ -9,8 +9,8 @@ from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.inference.search import MANY_FITS, TIME_OVER
+from wrist_stiffness.report.absorbed import absorbed_lines
 from wrist_stiffness.report.diagnosis_report import (
-    absorbed_lines,
     class_of,
     correction_of,
     verdict_lines,

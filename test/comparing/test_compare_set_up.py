@@ -121,7 +121,11 @@ def test_each_session_has_its_own_set_up(model):
     assert compared.before["s_um"].rms > 1000
     assert compared.after["s_um"].rms < 0.6
     assert "noise and drift of the instrument, no more (" in found.verdict[0]
-    assert [line.split(":")[0] for line in compared.absorbed] == ["day", "next day"]
+    taken = {each.name: each for each in compared.absorbed}
+    parts = ("measurement_frame@pose_sensor", "load_bias@load_sensor")
+    assert {f"{part} in {day}" for part in parts for day in ("day", "next day")} <= set(taken)
+    frame = taken["measurement_frame@pose_sensor in next day"]
+    assert (frame.parameter, frame.value) == ("shift_z_um", pytest.approx(2000.0, abs=30.0))
 
 
 def test_too_few_dwells_are_refused_and_why_there_are_no_more(model):

@@ -380,7 +380,7 @@ def test_the_noise_of_a_dwell_is_its_floor_less_the_hidden_count(model, count):
     jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
     hidden = np.sum(jacobian**2) * table.geometry.limits.encoder_step**2 / 12.0
     shift, square = 2e-6, hidden / count
-    noise = dwell_noise(table, (shift, float(np.sqrt(square))))
+    noise = dwell_noise(table, {"s_um": 1e6 * shift, "phi_mdeg": np.degrees(1e3 * np.sqrt(square))})
     assert np.sum(noise.white[:3] ** 2) == pytest.approx(shift**2)
     white = max(1.0 - count, LEAST_WHITE) * square
     assert np.sum(noise.white[3:] ** 2) == pytest.approx(white)

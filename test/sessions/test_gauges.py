@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.analysis import Analysis
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.comparing.compare import compare_models
@@ -230,6 +231,18 @@ def test_a_soft_link_is_calibrated_with_gauges(tmp_path, model, table):
     assert abs(own.value - 60.0) < 4.0 * own.sigma
     assert own.sigma < 15.0
     assert found.after["gauges_um"] < 0.5 * found.before["gauges_um"]
+
+
+def test_what_is_shown_of_gauges_lacks_their_zeros(tmp_path, model, table):
+    block = conditions(200)
+    session = read_session(imported(tmp_path, block, readings_of(model, block)), table)
+    analysis = Analysis(model, [session])
+    view, (told,) = analysis.view(), analysis.contents()
+    assert view.measured.shape == view.left.values.shape
+    shown = view.left.rms(np.nan_to_num(view.left.values) ** 2)
+    for key, noise in view.noise.items():
+        assert shown[key] < 1.2 * noise
+        assert told.registered[key] < 1.2 * noise
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.recording.messages import Header, JointState
+from wrist_stiffness.sessions.reading.joint_states import without_held
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals
 from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.sessions.reading.signals import Signal
@@ -158,6 +159,16 @@ def test_an_angle_that_cannot_be_reached_costs_its_pose_only(tmp_path, campaign,
     session = read_session(campaign.written(tmp_path / "bag"), table)
     assert len(session) == 797
     assert any("cannot reach" in remark for remark in session.remarks)
+
+
+@pytest.mark.parametrize("within_s", [0.2, 5.0])
+def test_poses_that_were_measured_again_before_the_next_are_no_held_angles(within_s):
+    """A measuring machine took each of thirty poses four times; the way to the next takes 5 s."""
+    theta = np.repeat(np.random.default_rng(0).uniform(-0.5, 0.5, (30, 2)), 4, axis=0)
+    wait_s = np.tile([5.0, within_s, within_s, within_s], 30)
+    angles = Signal(np.round(1e9 * np.cumsum(wait_s)).astype(np.int64), theta)
+    kept, held_s = without_held(angles)
+    assert (len(kept), held_s) == (120, 0.0)
 
 
 def test_angles_that_are_sent_again_and_again_are_taken_when_they_appear(tmp_path, campaign, table):

@@ -24,6 +24,7 @@ from wrist_stiffness.simulation.heat import CAPACITY, HEATED, TO_ROOM, HeatNetwo
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
 from wrist_stiffness.simulation.laws.bushing import Creep, play
 from wrist_stiffness.simulation.laws.drive import Backlash
+from wrist_stiffness.simulation.laws.law import Bending, Law
 from wrist_stiffness.simulation.laws.platform import Inertia
 from wrist_stiffness.simulation.laws.time_delay import DelayLine
 from wrist_stiffness.simulation.seat import Seat
@@ -45,6 +46,20 @@ def state_at(table, laws, theta, load, kelvin=COLD, time_s=None):
     theta, load = np.atleast_2d(theta), np.atleast_2d(load)
     time_s = np.arange(len(theta)) * 1.0 if time_s is None else time_s
     return TrueWrist(table, laws).at(time_s, theta, load, np.tile(kelvin, (len(theta), 1)))
+
+
+@pytest.mark.parametrize(
+    ("law", "hook", "said"),
+    [
+        (Law, "red_pose", "Law: no hook 'red_pose'; did you mean read_pose?"),
+        (Law, "bend", "Law: no hook 'bend'"),
+        (Bending, "bends", "Bending: no hook 'bends'; did you mean bend?"),
+    ],
+)
+def test_a_hook_that_nobody_calls_is_refused(law, hook, said):
+    with pytest.raises(InputError) as refused:
+        law("platform", **{hook: lambda *told: told})
+    assert str(refused.value).startswith(said)
 
 
 def block_of(table, n, time_s=None):

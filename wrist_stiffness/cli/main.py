@@ -171,10 +171,6 @@ def _require_place(path: str | None, option: str, begins: bytes) -> None:
     """
     if path is None:
         return
-    if Path(path).is_dir():
-        raise InputError(f"{path}: cannot be written: it is a folder")
-    if not Path(path).absolute().parent.is_dir():
-        raise InputError(f"{path}: folder {Path(path).parent} does not exist")
     require_room(path)
     if Path(path).is_file():
         try:

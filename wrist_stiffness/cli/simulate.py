@@ -80,7 +80,7 @@ USUAL_UNITS = {"rad": (180e3 / pi, "mdeg"), "m": (1e6, "um"), "kg": (1e3, "g"), 
     ),
     value("--base", "exact", "exact, or wrong as real wrists are"),
     one_of(
-        option("--effect", "hide this effect (names: docs)", "NAME@COMPONENT[:FORM]"),
+        option("--effect", "hide this effect; an unknown name lists all", "NAME@COMPONENT[:FORM]"),
         option("--blind", "hide what the seed draws", "SEED", type=int),
         option("--reveal", "tell what the seed hid", "SEED", type=int),
     ),

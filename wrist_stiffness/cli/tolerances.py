@@ -38,6 +38,7 @@ def tolerances(arguments: argparse.Namespace) -> int:
       wrist-stiffness tolerances --limit axis_misalignment@joint_2.shift_u_um=5
     """
     from wrist_stiffness.commands.tolerances import study_tolerances
+    from wrist_stiffness.report.terminal import tolerance_lines
 
     study = study_tolerances(
         model_named(arguments),
@@ -47,7 +48,7 @@ def tolerances(arguments: argparse.Namespace) -> int:
         arguments.seed,
         progress=Progress("wrists"),
     )
-    lines = study.lines()
+    lines = tolerance_lines(study)
     if arguments.picture:
         from wrist_stiffness.report.pictures.tolerances import draw_tolerances
 

@@ -55,7 +55,7 @@ def calibrate_model(
     mistake of the load is likely.  Raises `WristError` if a file cannot be read, used or written;
     then no model is written.
     """
-    output = writable(output)
+    require_model_place(output)
     parent = load_model(model)
     sessions = read_sessions(recordings, [parent], progress)
     step = run.step(model, sessions)
@@ -75,21 +75,11 @@ def calibrate_model(
     return Calibrated(found, measured, mistake)
 
 
-def writable(output: str | Path) -> Path:
-    """Return the path of a model to write, so that no fit ends in a typing error.
-
-    Raises `InputError` if its folder does not exist or takes no file, it is a folder, or its name
-    is that of a recording.
-    """
-    output = Path(output)
-    if not output.parent.is_dir():
-        raise InputError(f"{output}: there is no folder {output.parent}")
-    if output.is_dir():
-        raise InputError(f"{output}: cannot be written: it is a folder")
-    if output.suffix == ".mcap":
+def require_model_place(output: str | Path) -> None:
+    """Refuse a path that takes no model, so that no fit ends in a typing error (InputError)."""
+    if Path(output).suffix == ".mcap":
         raise InputError(f"{output}: a model is no recording; choose another name")
     require_room(output)
-    return output
 
 
 def fit_values(

@@ -22,7 +22,6 @@ from wrist_stiffness.comparing.wiring import WORTH_ASKING
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
-from wrist_stiffness.sessions.measured_session import DAMAGED
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +31,7 @@ class Compared:
     comparison: Comparison
     border: Array  # (b, 2), motor angles on the border of the operative workspace [rad]
     remarks: tuple[str, ...]  # what could not be used of the recordings
+    damage: tuple[str, ...]  # those of them on recordings that are cut or damaged
     fitted_here: tuple[str, ...]  # models that were fitted to one of these very recordings
     as_drawn: bool  # whether the last model was never fitted to any recording
     provenance: Provenance
@@ -40,11 +40,6 @@ class Compared:
         """Return the poses at which a model fails worst."""
         found = self.comparison
         return worst_poses(model.refitted, found.noise, found.sessions)
-
-    @property
-    def damage(self) -> tuple[str, ...]:
-        """Recordings that are cut or damaged, and how much of them was read."""
-        return tuple(remark for remark in self.remarks if f": {DAMAGED}" in remark)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -114,6 +109,7 @@ def compare(
         comparison,
         table.workspace.operative_border,
         remarks_of(sessions.values()),
+        tuple(f"{each.name}: {each.damage}" for each in sessions.values() if each.damage),
         fitted_here,
         not loaded[-1][1].lineage,
         Provenance(run.command, run.date, files, hashes),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrist_stiffness.commands.calibrate import fit_values, parameter_values, writable
+from wrist_stiffness.commands.calibrate import fit_values, parameter_values, require_model_place
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
 from wrist_stiffness.errors import InputError
@@ -74,6 +74,11 @@ class FormulaEffect:
         law = FormulaLaw(self.id, self.component, direction, self.expression, used, keys)
         estimates = {key: Estimate(self.start.get(key, 1.0)) for key in keys}
         return Effect(law, self.component, estimates)
+
+
+def common_covariates(sessions: Iterable[MeasuredSession]) -> list[str]:
+    """Return the names of what was recorded in all sessions, for `FormulaEffect.effect`."""
+    return sorted(set.intersection(*(set(each.block.covariates) for each in sessions)))
 
 
 def own_effect(name: str) -> Effect:
@@ -173,14 +178,13 @@ def extend_model(
     `progress`: told steps done and steps at most.  Raises `WristError` if a file cannot be read,
     used or written, or the effect cannot be added; then no model is written.
     """
-    output = writable(output)
+    require_model_place(output)
     parent = load_model(model)
     sessions = read_sessions(recordings, [parent], progress)
     measured = tuple(sessions.values())
     effect = addition
     if isinstance(effect, FormulaEffect):
-        covariates = frozenset.intersection(*(frozenset(s.block.covariates) for s in measured))
-        effect = effect.effect(sorted(covariates))
+        effect = effect.effect(common_covariates(measured))
     step = replace(run.step(model, sessions), added=effect.name)
     known = unfitted(parent) if was_fitted_to(parent, sessions) else parent
     found = extend(known, effect, measured, progress)

@@ -6,7 +6,7 @@ For a command that takes a folder of recordings, each of a wrist of its own::
         session = read_session(path, load_model(model).table)
         return {"poses": len(session)}
 
-    rows = spread(partial(summary, model="wrist.yaml"), recordings_in([folder]))
+    rows = spread(partial(summary, model="wrist.yaml"), list(recordings_in([folder])))
 
 Workers are processes of their own: function and result are pickled, so the function is one of a
 module and everything else reaches it by `functools.partial`.
@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 from wrist_stiffness.commands.read_sessions import Recordings
-from wrist_stiffness.errors import WristError
+from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.reading.folder import recordings_in
 
@@ -73,10 +73,13 @@ def each_recording(
     """Run a command on every recording by itself, as of a wrist of its own, in parallel.
 
     `command`: of recordings, its answer has `as_values`; can be pickled.  Raises `InputError` if
-    there is no recording.
+    there is no recording, or one is given more than once.
     """
+    given = recordings_in(recordings.paths)
+    if twice := [str(path) for path, times in given.items() if times > 1]:
+        raise InputError(f"{', '.join(twice)}: given more than once; each is a wrist of its own")
     one = partial(_values, command=command, recordings=recordings)
-    return spread(one, recordings_in(recordings.paths), progress=progress)
+    return spread(one, list(given), progress=progress)
 
 
 def _values(path: Path, command: Callable[[Recordings], Any], recordings: Recordings) -> Any:

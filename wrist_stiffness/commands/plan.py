@@ -127,7 +127,7 @@ def plan_experiment(
     else:
         rivals = read_rivals(diagnosis)
         question = between(rivals.classes, rivals.silent, rng)
-        noise = dwell_noise(model.table, rivals.floor)
+        noise = dwell_noise(model.table, rivals.noise)
         if recordings is not None:
             sessions = read_sessions(recordings, [model], silent)
             earlier = [as_experiment(model, session) for session in sessions.values()]

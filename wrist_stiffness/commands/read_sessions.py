@@ -12,7 +12,7 @@ import numpy as np
 
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.identification.calibration import CALIBRATED
-from wrist_stiffness.model.contribution import LEFT_OUT
+from wrist_stiffness.model.contribution import left_out
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256
 from wrist_stiffness.progress import Progress, silent
@@ -67,12 +67,11 @@ def read_sessions(
     WristError
         If a recording cannot be used.
     """
-    paths = recordings_in(recordings.paths)
-    given = Counter(path for each in recordings.paths for path in recordings_in([each]))
+    given = recordings_in(recordings.paths)
     found: dict[Path, MeasuredSession] = {}
     first: dict[str, Path] = {}
-    for done, path in enumerate(paths):
-        progress(done, len(paths))
+    for done, path in enumerate(given):
+        progress(done, len(given))
         table, settings = models[0].table, recordings.settings
         session = read_session(path, table, remaps=recordings.topics, settings=settings)
         same = first.setdefault(measured_sha256(session), path)
@@ -84,7 +83,7 @@ def read_sessions(
         else:
             said = f"{path} holds the same measurements: used once"
             found[same] = _with_remarks(found[same], [said])
-    progress(len(paths), len(paths))
+    progress(len(given), len(given))
     names = Counter(session.name for session in found.values())
     named = {
         path: session if names[session.name] == 1 else replace(session, name=str(path))
@@ -117,8 +116,8 @@ def _without_signal(session: MeasuredSession, models: Sequence[ErrorModel]) -> l
     """
     first = session.block.take(slice(0, 1))
     first = replace(first, theta=np.zeros((1, 2)), load=np.zeros((1, 6)))
-    warnings = (warning for model in models for warning in model.batch(first).warnings)
-    return list(dict.fromkeys(each for each in warnings if each.endswith(LEFT_OUT)))
+    lacking = (lack for model in models for lack in model.batch(first).lacking.items())
+    return [left_out(*lack) for lack in dict.fromkeys(lacking)]
 
 
 def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:

@@ -139,7 +139,7 @@ def hide(
     effect, _, place = name.partition("@")
     component, _, form = place.partition(":")
     if effect not in ALL:
-        raise unknown_effect(effect, ALL, "docs/hidden-effects.md")
+        raise unknown_effect(effect, ALL)
     if not (np.isfinite(size) and size > 0.0):
         raise InputError(f"effect {name!r}: size {size:g} is not a positive number")
     entry = ALL[effect]

@@ -127,21 +127,6 @@ class ToleranceStudy:
     others: Cost
     whole: Cost
 
-    def lines(self) -> list[str]:
-        """Return a table for a terminal."""
-        wide = max(len(cost.name) for cost in (*self.costs, self.others))
-        rows = [
-            f"{cost.name:{wide}}  {_number(cost.sigma)}"
-            + "".join(_with_sigma(*size) for size in cost.size.values())
-            for cost in (*self.costs, self.others, self.whole)
-        ]
-        return [
-            f"{self.model}: {self.wrists} virtual wrists at {self.poses} poses, "
-            f"load {' '.join(f'{value:g}' for value in self.load)}",
-            f"{'RMS beside the nominal model':{wide}}{'sigma':>10}{'s [um]':>13}{'phi [mdeg]':>20}",
-            *rows,
-        ]
-
     def as_values(self) -> dict[str, Any]:
         """Return what programs read."""
         return {
@@ -154,14 +139,6 @@ class ToleranceStudy:
             "none_alone": _values(self.others),
             "together": _values(self.whole),
         }
-
-
-def _with_sigma(value: float, sigma: float) -> str:
-    return f"{value:11.3f} " + (f"+-{sigma:6.3f}" if sigma else " " * 8)
-
-
-def _number(sigma: float) -> str:
-    return " " * 8 if np.isnan(sigma) else f"{sigma:8.3g}"
 
 
 def _values(cost: Cost) -> dict[str, Any]:

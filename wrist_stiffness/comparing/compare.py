@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
 from wrist_stiffness.comparing.explained import Explained, explain
-from wrist_stiffness.comparing.set_up import FREE, without_set_up
+from wrist_stiffness.comparing.set_up import without_set_up
 from wrist_stiffness.comparing.wiring import (
     LOAD_MISTAKES,
     MISTAKES,
@@ -21,6 +22,7 @@ from wrist_stiffness.comparing.wiring import (
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
 from wrist_stiffness.identification.free_effects import answering_as
+from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.inference.noise import FEWEST_REPEATS, replicate_variance
 from wrist_stiffness.inference.outliers import FEWEST_UNITS
@@ -31,7 +33,7 @@ from wrist_stiffness.sessions.observing import Observed
 from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
-Prepared = tuple[Observed, Explained, tuple[str, ...]]
+Prepared = tuple[Observed, Explained, tuple[TakenUp, ...]]
 
 VERY_STRONG = 5.0
 """Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
@@ -104,16 +106,19 @@ def _prepared(
             f"{FEWEST_UNITS}{why}"
         )
     used = np.concatenate([each.measured for each in cuts])
-    columns = np.concatenate(
-        [
-            np.pad(each.columns, ((0, 0), (0, 0), (n * FREE, (len(cuts) - 1 - n) * FREE)))
-            for n, each in enumerate(set_ups)
-        ]
-    )[used]
+    own = [
+        np.concatenate(
+            [each.columns if each is one else np.zeros_like(each.columns) for each in set_ups]
+        )[used]
+        for one in set_ups
+    ]
+    columns = np.concatenate(own, axis=2)
     z = np.concatenate([each.moved for each in set_ups])
     weights = np.concatenate([each.weights for each in set_ups])[used]
     left = explain(refitted, cuts, columns, z, weights)
-    return observed, left, tuple(each.sentence for each in set_ups)
+    table = observed.observations
+    taken = (each.taken_up(table, part) for each, part in zip(set_ups, own, strict=True))
+    return observed, left, tuple(chain.from_iterable(taken))
 
 
 def _same_wrist(one: ErrorModel, other: ErrorModel) -> bool:

@@ -13,6 +13,7 @@ from wrist_stiffness.comparing.curve import since_start_s
 from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import as_values, percent
 from wrist_stiffness.identification.questions import LOAD
+from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Observations, Quantity
 from wrist_stiffness.inference.held_out import time_blocks
 from wrist_stiffness.mechanism.components import Array
@@ -80,7 +81,7 @@ class ComparedModel:
     # residual after registrations, zeros and tare of every session were fitted again, and on what
     # it depends
     explained: Explained
-    absorbed: tuple[str, ...]  # what those took up
+    absorbed: tuple[TakenUp, ...]  # what those took up
 
     @property
     def refitted(self) -> Observations:
@@ -204,7 +205,7 @@ class Comparison:
             "model": model.name,
             "before_registration": {k: size.as_values() for k, size in model.before.items()},
             "after_registration": {k: size.as_values() for k, size in model.after.items()},
-            "absorbed": list(model.absorbed),
+            "absorbed": [each.sentence for each in model.absorbed],
             "explained_headroom": {q.key: self.headroom(model, q.key) for q in self.quantities},
             **as_values(model.explained),
         }

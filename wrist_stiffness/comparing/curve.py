@@ -128,7 +128,7 @@ def curve_of(
     along = columns[:, at].transpose(0, 2, 1) @ ways[0] * quantity.per_si
     names, shown = _best(observations, conditions, along @ values)
     most = FINE if len(conditions) == 1 else CLASSES
-    labels = _cells(shown) if len(names) == 2 else _classes(shown[:, 0], most)
+    labels = _cells(shown) if len(names) == 2 else classes_of(shown[:, 0], most)
     count = int(labels.max()) + 1
     share = np.zeros((count, len(labels)))
     share[labels, np.arange(len(labels))] = 1.0
@@ -166,7 +166,7 @@ def _best(
     found = []
     for name in varied:
         shown = condition_shown(observations, name)
-        classes = _classes(shown)
+        classes = classes_of(shown)
         means = np.bincount(classes, law) / np.bincount(classes)
         found.append((float(np.var(means[classes])), name, shown))
     share, name, shown = max(found, key=lambda each: each[0])
@@ -209,7 +209,7 @@ def condition_label(name: str) -> str:
     return f"{text} [{unit}]" if unit else text
 
 
-def _classes(values: Array, most: int = CLASSES) -> Labels:
+def classes_of(values: Array, most: int = CLASSES) -> Labels:
     """Return classes of about equal numbers of units; what is equal is in one class."""
     rounded = np.round(values, 9)
     if len(np.unique(rounded)) <= most:

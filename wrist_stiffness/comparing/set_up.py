@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference.observations import Mask, Observations
 from wrist_stiffness.inference.outliers import robust_scale
 from wrist_stiffness.mechanism.components import Array
@@ -19,9 +20,11 @@ from wrist_stiffness.mechanism.kinematics import Mechanism
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion, rotation_vector
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.parameters import si_factor
+from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.sessions.gauges import cleared
 from wrist_stiffness.sessions.observing import Observed, predict_units, tabulate, usual_wander
-from wrist_stiffness.sessions.refitted import REGISTRATIONS
+from wrist_stiffness.sessions.refitted import REGISTRATIONS, SET_UP, names_of
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 GROUPS = {
@@ -37,9 +40,6 @@ PLAUSIBLE = np.concatenate(
 )
 """Standard deviations of the priors [m, rad, N, N m]: directions that the units hardly tell
 apart stay small by them."""
-
-FREE = len(PLAUSIBLE)
-"""Numbers of one session's set-up."""
 
 ROUNDS = 4
 
@@ -76,22 +76,28 @@ class SetUp:
         """Where it stands, in standard deviations of the priors, (20,)."""
         return self.values / PLAUSIBLE
 
-    @property
-    def sentence(self) -> str:
-        """What was taken up, for a technician."""
-        x, y, zero, tare = (self.values[columns] for columns in GROUPS.values())
-        parts = [
-            f"{name} {1e6 * np.linalg.norm(six[:3]):.1f} um and "
-            f"{1e3 * np.degrees(np.linalg.norm(six[3:])):.1f} mdeg"
-            for name, six in (("instrument", x), ("target", y))
-            if six.any()
-        ]
-        angles = " and ".join(f"{1e3 * angle:.1f}" for angle in np.degrees(zero))
-        parts.append(f"zeros of the motors {angles} mdeg")
-        parts.append(
-            f"tare {np.linalg.norm(tare[:3]):.2g} N and {1e3 * np.linalg.norm(tare[3:]):.2g} mN m"
-        )
-        return f"{self.session}: {', '.join(parts)}"
+    def taken_up(self, table: Observations, columns: Array) -> list[TakenUp]:
+        """Tell what each part took up of a table, (u, 6, 20) being the columns there."""
+        found, place = [], 0
+        for name in names_of(SET_UP):
+            parameters = effect_named(name).parameters
+            own = slice(place, place + len(parameters))
+            place = own.stop
+            if not self.values[own].any():
+                continue
+            sizes = table.rms((columns[:, :, own] @ self.moved[own]) ** 2)
+            far = int(np.argmax(np.abs(self.moved[own])))
+            key, value = parameters[far].key, self.values[own][far]
+            found.append(
+                TakenUp(
+                    f"{name} in {self.session}",
+                    {q.name: sizes[q.key] for q in table.reported},
+                    key,
+                    float(value / si_factor(key)),
+                    float(abs(self.moved[own][far])),
+                )
+            )
+        return found
 
 
 def without_set_up(

@@ -222,5 +222,5 @@ def _require_signals(model: ErrorModel, effect: Effect, units: Sequence[UnitSess
     """Refuse an effect without its signals: its parameters would stay at nothing in silence."""
     for each in units:
         tried = model.with_effects().batch_with(each.block.take(slice(0, 2)), [(effect,)])[0]
-        if signal := tried.lacks(effect.name):
+        if signal := tried.lacking.get(effect.name):
             raise InputError(f"{each.name}: {effect.name}: {signal} is missing")

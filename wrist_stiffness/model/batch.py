@@ -127,6 +127,7 @@ def _predicted(
     twists, measured = np.full((2, len(models), len(block), 6), np.nan)
     memories: list[Memory | None] = [None] * len(models)
     warnings: list[dict[str, None]] = [{} for _ in models]
+    lacking: list[dict[str, str]] = [{} for _ in models]
     guesses: list[Guesses] = []
     for number, guess in zip(
         range(-(-len(usable) // CHUNK)), chain(near, repeat(NO_GUESSES)), strict=False
@@ -144,9 +145,12 @@ def _predicted(
             memories[group] = [each.memory for each in found]
             twists[group, own] = [each.twist for each in found]
             measured[group, own] = seen_by(found)
-            for known, each in zip(warnings[group], found, strict=True):
-                known.update(dict.fromkeys(each.warnings))
+            for n, each in zip(range(len(models))[group], found, strict=True):
+                warnings[n].update(dict.fromkeys(each.warnings))
+                lacking[n].update(each.lacking)
     return [
-        BlockPrediction(twists[i], measured[i], accepted, tuple(warnings[i]), tuple(guesses))
+        BlockPrediction(
+            twists[i], measured[i], accepted, tuple(warnings[i]), lacking[i], tuple(guesses)
+        )
         for i in range(len(models))
     ]

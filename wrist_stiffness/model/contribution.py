@@ -66,13 +66,14 @@ def together(a: Array | None, b: Array | None) -> Array | None:
 
 NOTHING = Contribution()
 
-LEFT_OUT = " is missing, left out"
-"""How the warning ends that an effect lacks a signal; the effect's name and the signal go before.
-"""
-
 
 class MissingSignalError(Exception):
     """A law asks for a signal that the samples lack; the evaluation turns it to a warning."""
+
+
+def left_out(effect: str, signal: str) -> str:
+    """Return the warning that an effect lacks a signal."""
+    return f"{effect}: {signal} is missing, left out"
 
 
 SEATS = tuple((LIMB[names[0]], BODIES.index(BODY[names[0]])) for names in GROUPS)

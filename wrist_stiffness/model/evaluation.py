@@ -30,11 +30,11 @@ from wrist_stiffness.mechanism.contact import solve_contacts
 from wrist_stiffness.mechanism.vectors import both_halves
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.contribution import (
-    LEFT_OUT,
     NOTHING,
     Constants,
     Contribution,
     MissingSignalError,
+    left_out,
 )
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import STAGES
@@ -75,6 +75,7 @@ class Advanced:
     added: Contribution  # what it added
     after: Any
     warnings: tuple[str, ...]  # that it lacks a signal, or that it is past first order
+    lacks: str = ""  # the signal without which it was left out
 
     @property
     def left(self) -> Any:
@@ -134,6 +135,11 @@ class Evaluated:
         """Where the effects whose states are guesses ended, by their names."""
         every = self.known.values()
         return {e.effect.name: e.after for e in every if e.effect.law.state_is_a_guess}
+
+    @property
+    def lacking(self) -> dict[str, str]:
+        """The signals without which effects were left out, by the effects' names."""
+        return {each.effect.name: each.lacks for each in self.known.values() if each.lacks}
 
     def added(self, stage: str) -> list[Contribution]:
         """Return what the effects of a stage added."""
@@ -278,8 +284,9 @@ def _advanced(
         before = state if guess is None else guess.after(state)
         added, after = _advanced_by(effect, at, before)
     except MissingSignalError as missing:
-        lacking = f"{effect.name}: {missing}{LEFT_OUT}"
-        return Advanced(effect, at, state, NOTHING, state, (lacking,))
+        signal = str(missing)
+        said = left_out(effect.name, signal)
+        return Advanced(effect, at, state, NOTHING, state, (said,), signal)
     return Advanced(effect, at, state, added, after, _first_order(effect, added))
 
 

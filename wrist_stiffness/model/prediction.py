@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
-from wrist_stiffness.model.contribution import LEFT_OUT
 
 
 @dataclass(frozen=True)
@@ -73,16 +72,11 @@ class BlockPrediction:
     # effects' memory passes over such samples as a node does
     accepted: NDArray[np.bool_]
     warnings: tuple[str, ...]  # each once
+    # signals without which effects were left out, by the effects' names
+    lacking: Mapping[str, str] = field(default_factory=dict)
     # where the first model's pins came to rest, chunk by chunk: where another prediction of the
     # same block may begin to look
     guesses: tuple[Mapping[str, Any], ...] = field(default=(), repr=False)
-
-    def lacks(self, effect: str) -> str:
-        """Return the signal without which an effect, by its name, was left out; empty for none."""
-        for warning in self.warnings:
-            if warning.startswith(f"{effect}: ") and warning.endswith(LEFT_OUT):
-                return warning.removeprefix(f"{effect}: ").removesuffix(LEFT_OUT)
-        return ""
 
 
 def seen(twist: Array, left: Array | None, right: Array | None) -> Array:

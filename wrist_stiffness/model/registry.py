@@ -56,15 +56,14 @@ def find_law(name: str) -> Law:
     """
     laws = catalogue()
     if name not in laws:
-        raise unknown_effect(name, laws, "docs/effects.md")
+        raise unknown_effect(name, laws)
     return laws[name]
 
 
-def unknown_effect(name: str, known: Iterable[str], page: str) -> InputError:
-    """Return the error of an effect that is none of those known, all of which a page lists."""
-    guess = meant(name, known)
-    others = f"{guess} (all: {page})" if guess else f"; known are {', '.join(sorted(known))}"
-    return InputError(f"unknown effect {name!r}{others}")
+def unknown_effect(name: str, known: Iterable[str]) -> InputError:
+    """Return the error of an effect that is none of those known."""
+    listed = ", ".join(sorted(known))
+    return InputError(f"unknown effect {name!r}{meant(name, known) or ';'} known are {listed}")
 
 
 def effect_named(name: str) -> Effect:

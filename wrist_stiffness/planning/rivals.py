@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,6 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.answer import SCHEMA
 from wrist_stiffness.inputs.document import Node, read_json
 from wrist_stiffness.inputs.schema import (
-    Quantity,
     list_of,
     mapping_of,
     number,
@@ -24,6 +24,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.planning.information import MeasurementNoise
+from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
 LEAST_WHITE = 0.25
 """Share of a rotation's floor that is no hidden encoder count, at least."""
@@ -37,15 +38,23 @@ class Rivals:
     # what was named, and of what was not sure enough
     classes: tuple[tuple[Effect, ...], ...]
     silent: tuple[Effect, ...]  # what its recordings could not have shown
-    # (2,), root mean square of shift and rotation that noise leaves [m, rad]
-    floor: tuple[float, float]
+    noise: Mapping[str, float]  # what noise leaves, RMS by the key of the quantity
 
 
-def dwell_noise(table: Table, floor: tuple[float, float]) -> MeasurementNoise:
-    """Return the noise of one dwell: the floor of `Rivals` without the hidden encoder count."""
+def dwell_noise(table: Table, floor: Mapping[str, float]) -> MeasurementNoise:
+    """Return the noise of one dwell: what a diagnosis calls noise, less the hidden encoder count.
+
+    Raises `InputError` if that is not of whole poses.
+    """
+    if not {"s_um", "phi_mdeg"} <= floor.keys():
+        raise InputError(
+            f"noise: only {', '.join(floor)} was measured; experiments are planned for an "
+            "instrument that measures position and rotation"
+        )
     step, mechanism = table.geometry.limits.encoder_step, table.mechanism
     jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))
-    shift, rotation = (value**2 for value in floor)
+    shift = (floor["s_um"] / MICROMETRES) ** 2
+    rotation = (floor["phi_mdeg"] / MILLIDEGREES) ** 2
     hidden = float(np.sum(jacobian**2)) * step**2 / 12.0
     white = np.array([shift, max(rotation - hidden, LEAST_WHITE * rotation)])
     return MeasurementNoise(np.repeat(np.sqrt(white / 3.0), 3), step)
@@ -58,11 +67,11 @@ def read_rivals(path: str | Path) -> Rivals:
     of the catalogue.
     """
     found = DIAGNOSIS(read_json(path, InputError))
-    floor, silent = found["noise"], found["not_excited"]
+    silent = found["not_excited"]
     return Rivals(
         (*found["findings"], *found["suspects"]),
         tuple({effect.name: effect for effect in silent}.values()),
-        (floor["s"], floor["phi"]),
+        found["noise"],
     )
 
 
@@ -89,21 +98,10 @@ def _members(node: Node) -> tuple[Effect, ...]:
     return (effects[0].with_values(values), *effects[1:])
 
 
-def _noise(node: Node) -> dict[str, float]:
-    floor = mapping_of(lambda inner: inner)(node)
-    if not {"s_um", "phi_mdeg"} <= set(floor):
-        raise node.refuse(
-            f"only {', '.join(floor)} was measured; experiments are planned for an instrument that "
-            "measures position and rotation"
-        )
-    known = dict.fromkeys(("s_um", "phi_mdeg"), Quantity(number(above=0.0)))
-    return dict(record(known, others=True)(node))
-
-
 DIAGNOSIS = record(
     {
         "schema": version(SCHEMA),
-        "noise": _noise,
+        "noise": mapping_of(number(above=0.0)),
         "findings": list_of(_members),
         "suspects": list_of(_members),
         "not_excited": list_of(_effect),

@@ -101,7 +101,7 @@ def _signature(model: ErrorModel, block: Block, sets: Sequence[Effect]) -> Signa
     else:
         changes = [each.measured - without.measured for each in further[len(moved) :]]
         truths = np.stack(changes, axis=-1)
-    return Signature(first, columns, truths, at_base.lacks(first.name))
+    return Signature(first, columns, truths, at_base.lacking.get(first.name, ""))
 
 
 def _step(parameter: Parameter, base: Effect, linear: bool) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.inference import Quantity
+from wrist_stiffness.report.absorbed import absorbed_table
 from wrist_stiffness.report.page import (
     Bullets,
     Page,
@@ -72,7 +73,7 @@ def report_of_comparison(compared: Compared) -> Page:
     sections["On what the error depends"] += _dependence(found.models)
     absorbed: list[Part] = []
     for model in found.models:
-        absorbed += [f"What the refit took up for {model.name}:", Bullets(model.absorbed)]
+        absorbed += [f"What the refit took up for {model.name}:", absorbed_table(model.absorbed)]
     sections["How far off"] = [_bars(compared), *sections["How far off"], *absorbed]
     # All models are drawn together, or the first and the last few.
     most = MOST_MAPPED

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent, sentences
-from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
+from wrist_stiffness.inference.answer import NotExcited
 from wrist_stiffness.inference.search import TIME_OVER
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.report.absorbed import absorbed_lines, absorbed_table
 from wrist_stiffness.report.page import (
     TITLES,
     Bullets,
@@ -27,6 +29,7 @@ from wrist_stiffness.report.page import (
     provenance_section,
 )
 from wrist_stiffness.report.pictures.errors import Bars, draw_against, draw_bars
+from wrist_stiffness.sessions.observing import without_mounting
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.diagnose import Diagnosed
@@ -36,9 +39,6 @@ MOST_PICTURED = 4
 
 MOST_RANKED = 12
 """Candidates that are told."""
-
-USUAL = 1.0
-"""Standard deviations of its prior within which a tolerance needs no line of its own."""
 
 MOST_PROMISING = 3
 
@@ -60,7 +60,7 @@ def diagnosis_lines(found: Diagnosed) -> list[str]:
     """Return the answer for a terminal, the verdict first."""
     result = found.result
     sections: Sections = {
-        **_sections(result),
+        **_sections(result, _unseen_in_short),
         "Absorbed by calibration, largest first": [Bullets(absorbed_lines(found.answer.absorbed))],
         "To be kept in mind": [Bullets(found.remarks)] if found.remarks else [],
     }
@@ -79,14 +79,14 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
             for key, before in result.before.items()
         ]
         verdict.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
-    sections = _sections(result)
+    sections = _sections(result, _unseen)
     if result.findings:
         sections["How large the error is"].append(_fall(result))
     laws = [line.strip() for line in found.proposed()]
     remains: list[Part] = [*(rest_lines(result) or ["Nothing beyond the noise."])]
     remains += [Command(line) if line.startswith("wrist-stiffness ") else line for line in laws]
     taken = found.answer.absorbed
-    absorbed: list[Part] = [_absorbed(taken)] if taken else []
+    absorbed: list[Part] = [absorbed_table(taken)] if taken else []
     if found.remarks:
         absorbed += ["To be kept in mind:", Bullets(found.remarks)]
     whole: Sections = {
@@ -108,8 +108,10 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
     )
 
 
-def _sections(result: Diagnosis) -> dict[str, list[Part]]:
-    """Return what both tell."""
+def _sections(
+    result: Diagnosis, unseen: Callable[[Sequence[NotExcited]], Part]
+) -> dict[str, list[Part]]:
+    """Return what both tell; `unseen`: of effects that could hide."""
     findings: list[Part] = []
     for place, finding in enumerate(result.findings, 1):
         findings.append(f"{place}. {class_of(finding)}. {finding.evidence}")
@@ -127,18 +129,29 @@ def _sections(result: Diagnosis) -> dict[str, list[Part]]:
         ["", *(TITLES[key] for key in result.before)],
         [[name, *(number(row[key]) for key in result.before)] for name, row in rows],
     )
-    needs: dict[str, list[str]] = {}
-    for each in result.not_excited:
-        needs.setdefault(each.needs, []).append(f"{each.effect}@{each.component}")
-    unseen = [f"{', '.join(names)}: {need}" for need, names in needs.items()]
     return {
         "Findings": findings or ["No effect of the catalogue was found."],
         "How large the error is": [table],
         "Every candidate": [_ranking(result)],
         "What these recordings cannot show": [
-            Bullets(unseen) if unseen else "Every effect of the catalogue would have shown."
+            unseen(result.not_excited)
+            if result.not_excited
+            else "Every effect of the catalogue would have shown."
         ],
     }
+
+
+def _unseen(effects: Sequence[NotExcited]) -> Bullets:
+    needs: dict[str, list[str]] = {}
+    for each in effects:
+        needs.setdefault(each.needs, []).append(f"{each.effect}@{each.component}")
+    return Bullets([f"{', '.join(names)}: {need}" for need, names in needs.items()])
+
+
+def _unseen_in_short(effects: Sequence[NotExcited]) -> str:
+    laws = Counter(each.effect for each in effects)
+    names = ", ".join(f"{law} ({n} places)" if n > 1 else law for law, n in laws.items())
+    return f"{names}. What to record for each: --report or --json."
 
 
 def _name(key: str) -> str:
@@ -196,8 +209,9 @@ def _depends(found: Diagnosed, left: Explained) -> list[Part]:
         return [told]
     series = []
     if found.result.findings:
-        after = left.observations.with_values(found.answer.fitted.residual)
-        series.append(("with the findings", after))
+        table = left.observations
+        after = without_mounting(table, found.answer.fitted.residual)
+        series.append(("with the findings", table.with_values(after)))
     caption = (
         "What the refitted base leaves against the conditions that show it best, everything else "
         "that was found taken out: every dwell and half second in motion, and the fitted law with "
@@ -263,32 +277,3 @@ def correction_of(finding: Finding) -> str:
     if find_law(law).of_measurement(place):
         return "it is in the instrument, so nothing is to be corrected"
     return "it shifts the platform and does not turn it, so only the manipulator can correct it"
-
-
-def _absorbed(absorbed: Sequence[TakenUp]) -> Table:
-    quantities = list(absorbed[0].moved)
-    rows = [
-        (
-            each.name,
-            *(number(each.moved[name]) for name in quantities),
-            f"{each.parameter} = {number(each.value)}" if each.parameter else "",
-            f"{each.deviations:.1f}" if each.parameter else "-",
-        )
-        for each in absorbed
-    ]
-    caption = (
-        "By how much set-up and tolerances moved the prediction (RMS), and the parameter that went "
-        "furthest from its drawing, in standard deviations of its prior."
-    )
-    titles = [TITLES[next(key for key in TITLES if _name(key) == name)] for name in quantities]
-    return Table(caption, ("", *titles, "furthest", "deviations"), rows)
-
-
-def absorbed_lines(absorbed: Sequence[TakenUp]) -> list[str]:
-    """Return set-up and what left its usual range a line each, all the rest in one."""
-    within = [each for each in absorbed if each.parameter and each.deviations <= USUAL]
-    out = [each.sentence for each in absorbed if each not in within]
-    if within:
-        names = ", ".join(each.name for each in within)
-        out.append(f"within {USUAL:g} standard deviation of their tolerances: {names}")
-    return out

@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from wrist_stiffness import topics
 from wrist_stiffness.commands.plan import COLUMNS, plan_rows
+from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.planning.aims import LONGER, Answer
@@ -98,13 +99,13 @@ def plan_summary(plan: Plan, commissioning: bool = False) -> str:
     longer = [a for a in (*seen, *pairs) if not a.settled and a.reachable]
     lines += _listed(
         "may stay open; diagnose the new recordings too and plan again, or give it more time:",
-        map(_line, _weakest(longer)),
+        _weakest(longer),
     )
     never = [a for a in (*seen, *pairs) if not a.reachable]
     lines += _listed(
         f"no experiment of this kind with these loads settles, even {LONGER:g} times as long as "
         "all settings that were considered:",
-        map(_line, _weakest(never)),
+        _weakest(never),
     )
     lines += _listed(
         "not for poses and loads to show:",
@@ -131,18 +132,22 @@ def _what(plan: Plan) -> str:
     )
 
 
-def _weakest(answers: list[Answer]) -> list[Answer]:
-    return sorted(answers, key=lambda answer: answer.discrimination)
+def _weakest(answers: Sequence[Answer]) -> list[str]:
+    """Return a line for each truth, with the rival that is hardest to tell from it."""
+    alike: dict[tuple[str, bool], list[Answer]] = {}
+    for each in sorted(answers, key=lambda answer: answer.discrimination):
+        alike.setdefault((each.goal.truth, bool(each.goal.rival)), []).append(each)
+    return [_line(first, len(others)) for first, *others in alike.values()]
 
 
-def _line(answer: Answer) -> str:
+def _line(answer: Answer, others: int = 0) -> str:
     goal, d = answer.goal, answer.discrimination
     if not goal.rival:
         return f"{goal.truth} against nothing: {d:.1f} standard deviations"
-    right = 100.0 * float(chance_right(d))
+    more = f" and {others} more" if others else ""
     return (
-        f"{goal.truth} if true, against {goal.rival}: {d:.1f} standard deviations, right in "
-        f"{min(right, 99.9):.1f} %"
+        f"{goal.truth} if true, against {goal.rival}{more}: {d:.1f} standard deviations, right in "
+        f"{percent(float(chance_right(d)))}"
     )
 
 

@@ -1,4 +1,4 @@
-"""What `predict`, `explain`, `table` and `replay` tell on a terminal."""
+"""What `predict`, `explain`, `table`, `replay` and `tolerances` tell on a terminal."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from wrist_stiffness.commands.modes import ModeSummary
     from wrist_stiffness.commands.output_changes import TopicChanges
     from wrist_stiffness.commands.replay_block import ReplaySummary
+    from wrist_stiffness.commands.tolerances import ToleranceStudy
 
 
 def prediction_lines(values: dict[str, Any], loaded: bool) -> list[str]:
@@ -153,6 +154,31 @@ def replay_lines(summary: ReplaySummary) -> list[str]:
     for reason, count in summary.refused.most_common():
         lines.append(f"{count} refused, the first: {reason}")
     return lines
+
+
+def tolerance_lines(study: ToleranceStudy) -> list[str]:
+    """Return what each tolerance costs."""
+    rows = [
+        [
+            cost.name,
+            page.number(cost.sigma),
+            *(
+                page.plus_minus(*size) if size[1] else page.number(size[0])
+                for size in cost.size.values()
+            ),
+        ]
+        for cost in (*study.costs, study.others, study.whole)
+    ]
+    load = " ".join(f"{value:g}" for value in study.load)
+    head = (
+        "RMS beside the nominal model",
+        "sigma",
+        *(page.TITLES[key] for key in study.whole.size),
+    )
+    return [
+        f"{study.model}: {study.wrists} virtual wrists at {study.poses} poses, load {load}",
+        *page.Table("", head, rows).lines(),
+    ]
 
 
 def change_line(topic: TopicChanges) -> str:

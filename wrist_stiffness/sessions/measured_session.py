@@ -16,9 +16,6 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.sessions.gauges import Gauges
 from wrist_stiffness.sessions.in_pieces import in_pieces
 
-DAMAGED = "the recording is damaged"
-"""How a remark begins that tells of it."""
-
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSession:
@@ -42,6 +39,8 @@ class MeasuredSession:
     notes: Mapping[str, Any] = field(default_factory=dict)
     # what could not be used of the recording or was put right, a line for each
     remarks: tuple[str, ...] = ()
+    # the one of them that says it is cut or damaged, and how much is used; empty where it is whole
+    damage: str = ""
     # pose sensor's clock minus the joint states', estimate and one standard uncertainty, where the
     # motion tells it [s]
     clock_offset_s: tuple[float, float] | None = None

@@ -135,6 +135,16 @@ class UnitSession:
         """Mean signals of the units, for effects without a memory."""
         return self.block.mapped(self.mean)
 
+    @property
+    def span(self) -> Array:
+        """First and last moment of each unit, (u, 2) [s]."""
+        used = self.cut.unit >= 0
+        unit, time = self.cut.unit[used], self.block.time[used]
+        span = np.tile([np.inf, -np.inf], (len(self), 1))
+        np.minimum.at(span[:, 0], unit, time)
+        np.maximum.at(span[:, 1], unit, time)
+        return span
+
     @cached_property
     def known(self) -> dict[Any, Any]:
         """What models on it found out, and the next ones need not again: see `SessionModel`.

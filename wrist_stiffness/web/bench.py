@@ -20,7 +20,7 @@ import numpy as np
 from wrist_stiffness.analysis import Analysis, Version
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.commands.diagnose import Diagnosed
-from wrist_stiffness.commands.extend import FormulaEffect
+from wrist_stiffness.commands.extend import FormulaEffect, common_covariates
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.commands.provenance import Provenance
 from wrist_stiffness.commands.read_sessions import (
@@ -160,9 +160,8 @@ class Bench:
         self._analysis = Analysis(loaded, list(sessions.values()), *told, again)
         self._answer, self._model, self._paths = None, model, list(sessions)
         self._options = []
-        shared = [set(each.block.covariates) for each in sessions.values()]
         return {
-            "covariates": tuple(sorted(set.intersection(*shared))),
+            "covariates": tuple(common_covariates(sessions.values())),
             "names": tuple(path.name for path in sessions),
             "model_path": model,
             "contents": self._analysis.contents(),
@@ -207,8 +206,7 @@ class Bench:
         if isinstance(candidate, str):
             asked, option = candidate, f"--effect {candidate}"
         else:
-            common = [set(each.block.covariates) for each in self._opened.sessions]
-            asked = candidate.effect(sorted(set.intersection(*common)))
+            asked = candidate.effect(common_covariates(self._opened.sessions))
             option = f"--formula {shlex.quote(candidate.expression)} --component "
             way = shlex.quote(words_of(candidate.direction))
             option += f"{candidate.component} --direction {way} --name {candidate.id}"
@@ -247,14 +245,9 @@ class Bench:
             raise InputError(f"a weight of {grams:g} g is not above 0 and up to {HEAVIEST_G:g} g")
         self._tell(f"planning an experiment between {' and '.join(rivals)}")
         table = analysis.model.table
-        noise = answer.diagnosis.noise
-        if not {"s_um", "phi_mdeg"} <= noise.keys():
-            raise InputError(
-                "a plan needs the noise of whole poses, and these recordings have none"
-            )
-        floor = 1e-6 * noise["s_um"], float(np.radians(1e-3 * noise["phi_mdeg"]))
+        noise = dwell_noise(table, answer.diagnosis.noise)
         weight = Weight(f"{grams:g} g", 1e-3 * grams, table.geometry.load_point, HANG_S)
-        conditions = Conditions((weight,), USUAL_PACE, dwell_noise(table, floor), None, seed=0)
+        conditions = Conditions((weight,), USUAL_PACE, noise, None, seed=0)
         found = analysis.plan(rivals, conditions)
         text = plan_summary(found)
         if found.timeline is None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from wrist_stiffness.analysis import View
 from wrist_stiffness.comparing.curve import ANGLES, Curve, condition_label, condition_shown
-from wrist_stiffness.inference.observations import Labels, Mask, Observations, Quantity
+from wrist_stiffness.inference.observations import Mask, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.report.page import number, typeset
 from wrist_stiffness.report.pictures.figure import COLOURS, FLOOR
@@ -37,6 +37,13 @@ REMOVED = ("zoom2d", "zoomIn2d", "zoomOut2d", "autoScale2d")
 
 LOWER = {"yaxis": "y2", "showlegend": False}
 """Of traces in the lower of two plots."""
+
+GAP_S = 1.0
+"""Time without a measurement over which no line is drawn: moments of one motion that follow each
+other are half as far apart."""
+
+DASH_S = 0.5
+"""Before and after a pose that was measured once, between two gaps: it is a short line."""
 
 BREAK_MIN = 0.3
 """Gap between two recordings on one axis of time."""
@@ -135,7 +142,7 @@ def error_map(shown: Shown, border: Array) -> Figure:
     }
     told = f"motors %{{x:.1f}}°, %{{y:.1f}}°: %{{marker.color:.3g}} {shown.unit}"
     points["hovertemplate"] = f"{told}<extra></extra>"
-    outline = _line(edge[:, 0], edge[:, 1], "operative border", FLOOR, ())
+    outline = _line(edge[:, 0], edge[:, 1], "operative border", FLOOR)
     outline |= {"line": {"color": FLOOR, "width": 1.5, "dash": "dash"}, "hoverinfo": "name"}
     ring = {
         "type": "scatter",
@@ -158,17 +165,18 @@ def error_map(shown: Shown, border: Array) -> Figure:
 def time_line(shown: Shown) -> Figure:
     """Return measured and predicted error over time, and what is left below."""
     view, table = shown.view, shown.view.left
-    time, breaks = minutes(table), 1 + np.flatnonzero(np.diff(table.sessions))
+    time = minutes(table)
     measured, predicted = shown.part(view.measured), shown.part(view.predicted)
     left = shown.part(table.values)
     traces = [
         _dots(time, measured, "measured", FLOOR, shown, 4),
-        _line(time, predicted, "predicted", BLUE, breaks),
+        _line(*over_time(view, predicted), "predicted", BLUE),
         _dots(time, left, "left", BLUE, shown, 4) | LOWER,
     ]
     if shown.after is not None:
         after = shown.part(shown.after)
-        traces.insert(2, _line(time, predicted + left - after, shown.name, RED, breaks))
+        told = over_time(view, predicted + left - after)
+        traces.insert(2, _line(*told, shown.name, RED))
         traces.append(_dots(time, after, "left", RED, shown, 4) | LOWER)
     figure = _figure(traces, "time [min]", shown.label, "time")
     cut = {"color": FLOOR, "width": 1, "dash": "dot"}
@@ -199,7 +207,7 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
         traces.append(_dots(values, part(shown.after), shown.name, RED, shown))
     elif told is not None:
         traces = [_dots(values, told.measured, "remaining error", BLUE, shown)]
-        traces.append(_line(told.places[:, 0], told.mean, "fitted law", RED, ()))
+        traces.append(_line(told.places[:, 0], told.mean, "fitted law", RED))
     figure = _figure(traces, condition_label(condition), label, condition)
     figure["layout"] |= {"dragmode": "lasso", "showlegend": True, "legend": LEGEND}
     return figure
@@ -253,13 +261,27 @@ def _dots(x: Array, y: Array, name: str, colour: str, shown: Shown, size: int = 
     }
 
 
-def _line(x: Array, y: Array, name: str, colour: str, breaks: Sequence[int] | Labels) -> Figure:
+def over_time(view: View, values: Array) -> tuple[Array, Array]:
+    """Return a line through values (u,): level over each unit, none where nothing was measured."""
+    table, span = view.left, view.span - view.left.times[:, None]
+    # Moments of a motion are short: one point each; a pose that was measured once has some width.
+    long = np.ptp(span, axis=1) > GAP_S
+    apart = view.span[1:, 0] - view.span[:-1, 1] > GAP_S
+    apart |= np.diff(table.sessions) != 0
+    alone = np.append(True, apart) & np.append(apart, True)
+    span = np.where(long[:, None], span, 0.0) + np.outer(alone & ~long, [-DASH_S, DASH_S])
+    x = (minutes(table)[:, None] + span / 60.0).ravel()
+    breaks = 2 * (1 + np.flatnonzero(apart))
+    return np.insert(x, breaks, np.nan), np.insert(np.repeat(values, 2), breaks, np.nan)
+
+
+def _line(x: Array, y: Array, name: str, colour: str) -> Figure:
     return {
         "type": _kind(len(x)),
         "mode": "lines",
         "name": name,
-        "x": np.insert(x, breaks, np.nan),
-        "y": np.insert(y, breaks, np.nan),
+        "x": x,
+        "y": y,
         "line": {"color": colour, "width": 1.5},
     }
 

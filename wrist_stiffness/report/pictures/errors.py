@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, lengths
-from wrist_stiffness.comparing.curve import CELL_DEG, Curve, ranks
+from wrist_stiffness.comparing.curve import CELL_DEG, Curve, classes_of, since_start_s
 from wrist_stiffness.comparing.explained import Told
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.mechanism.components import Array
@@ -20,9 +20,6 @@ LINES = {"--": "dashed", ":": "dotted", "-.": "dash-dotted"}
 
 MOST_SESSIONS = 6
 """Time lines of more sessions would be too small to read."""
-
-CLASSES = 12
-"""Units of a further model are averaged in so many classes of the condition."""
 
 MOST_LETTERS = 28
 """Of a name beside a bar or above a plot; of a longer one the end is shown, where paths differ."""
@@ -141,7 +138,7 @@ def draw_time_line(found: Comparison, models: Sequence[ComparedModel]) -> Any:
     for row, quantity in zip(plots, found.quantities, strict=True):
         for plot, number in zip(row, numbers, strict=True):
             own = units.sessions == number
-            minutes = (units.times[own] - units.times[own].min()) / 60.0
+            minutes = since_start_s(units)[own] / 60.0
             for place, model in enumerate(models):
                 plot.plot(
                     minutes,
@@ -226,9 +223,7 @@ def _draw_curve(plot: Any, each: Curve, models: Sequence[tuple[str, Observations
 
 def _means(values: Array, residual: Array) -> tuple[list[float], list[float], list[float]]:
     """Return means over classes of equal numbers of units, with standard errors."""
-    rounded = np.round(values, 9)
-    # Equal values share a rank, so what is the same condition is one class.
-    classes = np.floor((ranks(rounded) - 0.5) * CLASSES / len(values))
+    classes = classes_of(values)
     at, means, errors = [], [], []
     for place in np.unique(classes):
         own = residual[classes == place]

@@ -9,7 +9,7 @@ import numpy as np
 
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.planning.timeline import Timeline
-from wrist_stiffness.report.pictures.figure import new_figure, save_figure
+from wrist_stiffness.report.pictures.figure import new_figure, over_angles, save_figure
 
 MARKERS = "osD^vP*X<>"
 """Of the loads, none first."""
@@ -96,8 +96,6 @@ def _draw_poses(figure: Any, plot: Any, table: Table, timeline: Timeline) -> Non
         )
     bar = figure.colorbar(shown, ax=plot, location="bottom", shrink=0.8)
     bar.set_label("order of the visits")
-    plot.set_aspect("equal")
-    plot.set_xlabel("motor 1 angle θ₁ [deg]")
-    plot.set_ylabel("motor 2 angle θ₂ [deg]")
+    over_angles(plot)
     plot.set_title(f"{table.geometry.name}: poses, arrows = last approach", fontsize=9)
     plot.legend(fontsize=7, loc="upper right")

@@ -23,6 +23,13 @@ def new_figure(width_in: float, height_in: float) -> Any:
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
+def over_angles(plot: Any) -> None:
+    """Make a plot one over the angles of both motors [deg]."""
+    plot.set_aspect("equal")
+    plot.set_xlabel("motor 1 angle θ₁ [deg]")
+    plot.set_ylabel("motor 2 angle θ₂ [deg]")
+
+
 def save_figure(figure: Any, path: Path) -> None:
     """Write a figure as PNG, complete or not at all (InputError if that fails)."""
     with writing(path) as written:

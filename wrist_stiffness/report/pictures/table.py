@@ -15,7 +15,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.modes import RigidBody
 from wrist_stiffness.report.pictures.bent_wrist import draw_bent_wrist, draw_mode_shapes
-from wrist_stiffness.report.pictures.figure import new_figure, save_figure
+from wrist_stiffness.report.pictures.figure import new_figure, over_angles, save_figure
 from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
 BANDS = 12
@@ -47,9 +47,7 @@ def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, p
     plot.clabel(lines, fontsize=7, fmt="%.3g")
     border = np.degrees(workspace.operative_border)
     plot.plot(*border.T, color="black", linewidth=2.0, label="operative workspace")
-    plot.set_xlabel("motor 1 angle θ₁ [deg]")
-    plot.set_ylabel("motor 2 angle θ₂ [deg]")
-    plot.set_aspect("equal")
+    over_angles(plot)
     plot.set_title(
         f"{table.geometry.name}: {label}\n{load}; operative workspace "
         f"{operative.min():.3g} to {operative.max():.3g}, mean {operative.mean():.3g}; "
@@ -98,9 +96,7 @@ def draw_budget(table: Table, budget: Budget, load: str, path: Path) -> None:
     for number in np.unique(largest):
         where.plot([], [], "s", color=colours[number], label=ELASTIC[number])
     where.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), title="largest share")
-    where.set_aspect("equal")
-    where.set_xlabel("motor 1 angle θ₁ [deg]")
-    where.set_ylabel("motor 2 angle θ₂ [deg]")
+    over_angles(where)
     save_figure(figure, path)
 
 

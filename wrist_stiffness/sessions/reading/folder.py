@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -28,12 +29,12 @@ def is_recording(path: Path) -> bool:
     return bool(storage) and all(own.fullmatch(file.stem) for file in storage)
 
 
-def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
-    """Return the recordings that paths name: a folder of recordings stands for all of them.
+def recordings_in(paths: Iterable[str | Path]) -> Counter[Path]:
+    """Return the recordings that paths name, and how often: a folder stands for all that it holds.
 
     Raises `RecordingError` if a path does not exist, or a folder holds no recording.
     """
-    found: dict[Path, None] = {}
+    found = Counter[Path]()
     for path in map(Path, paths):
         if not os.path.exists(path):
             raise RecordingError(f"{path} does not exist")
@@ -43,12 +44,12 @@ def recordings_in(paths: Iterable[str | Path]) -> list[Path]:
                 "after --model, other commands first"
             )
         if is_recording(path) or not path.is_dir():
-            found[path] = None
+            found[path] += 1
             continue
         inside = sorted(entry for entry in path.iterdir() if is_recording(entry))
         if not inside:
             raise RecordingError(
                 f"{path} holds no recording: neither rosbag2 folders nor {STORAGE} files"
             )
-        found |= dict.fromkeys(inside)
-    return list(found)
+        found.update(inside)
+    return found

@@ -20,6 +20,10 @@ SAME_RAD = 1e-9
 
 LEAST_CHANGES = 20
 
+LONGEST_HELD_S = 1.0
+"""Every driver reads its encoders more often; what repeats for longer is a pose that was measured
+again before the next one, as in the table of a measuring machine [s]."""
+
 DENSE_S = 0.025
 """Median time between joint states below which out and back is no motion [s]."""
 
@@ -54,9 +58,12 @@ def without_held(angles: Signal) -> tuple[Signal, float]:
     changed = 1 + np.flatnonzero((change > 0.0).any(axis=1))
     least = np.maximum(LEAST_CHANGE_RAD, LEAST_CHANGE_COUNTS * _steps(angles.values))
     large = np.any(change[changed - 1] > least, axis=1)
-    messages = np.diff(changed)[large[1:] & large[:-1]]
-    every = round(float(np.median(messages))) if len(messages) >= LEAST_CHANGES else 1
-    if every == 1:
+    in_motion = large[1:] & large[:-1]
+    if in_motion.sum() < LEAST_CHANGES:
+        return angles, 0.0
+    every = round(float(np.median(np.diff(changed)[in_motion])))
+    held_s = float(np.median(np.diff(angles.time_ns[changed])[in_motion])) / NANOSECONDS
+    if every == 1 or held_s > LONGEST_HELD_S:
         return angles, 0.0
     # At rest a reading is as new as in motion, and looks like a repetition.
     rows = np.arange(len(angles))
@@ -69,8 +76,7 @@ def without_held(angles: Signal) -> tuple[Signal, float]:
     kept = (since % every == 0) & ((since == 0) | (left > every // 2))
     # A first angle that is sent less often than others appeared before the recording began.
     kept[0] = changed[0] >= every
-    period_s = float(np.median(np.diff(angles.time_ns))) / NANOSECONDS
-    return Signal(angles.time_ns[kept], angles.values[kept]), every * period_s
+    return Signal(angles.time_ns[kept], angles.values[kept]), held_s
 
 
 def _steps(values: Array) -> Array:

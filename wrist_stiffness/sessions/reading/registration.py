@@ -195,8 +195,9 @@ def registered(shift: Array, rotation: Array, rigid: Array) -> Registration:
     known = np.isfinite(rotation).all(axis=(1, 2)) & np.isfinite(shift).all(axis=1)
     if not known.any():
         raise InputError(
-            "an instrument of which nobody knows where it stands needs positions and rotations of "
-            "the same poses, or three markers; map its frame"
+            "points alone do not tell where the instrument stands: measure rotations as well, or "
+            "three markers, or points in the axes of wrist_base (a table: import without "
+            "--register)"
         )
     seen, said = rotation[known], rigid[known]
     instrument, target = (each.as_matrix() for each in turns_of(seen, said))

@@ -28,7 +28,7 @@ from wrist_stiffness.recording import open_recording, read_samples
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
-from wrist_stiffness.sessions.measured_session import DAMAGED, MeasuredSession, beyond_range
+from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
 from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings, held_to
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
@@ -110,16 +110,15 @@ def read_session(
     except (FrameError, InputError, RecordingError) as error:
         hints = known.hints if isinstance(error, FrameError) else map(str, samples.faults)
         raise type(error)("; ".join([f"{recording.path}: {error}", *hints])) from error
-    read_s = np.ptp(session.block.time)
-    damage = (
-        [f"{DAMAGED}, {read_s:.0f} s of it are used: {recording.damage}"]
-        if recording.damage
-        else []
-    )
+    damage = ""
+    if recording.damage:
+        read_s = np.ptp(session.block.time)
+        damage = f"the recording is damaged, {read_s:.0f} s of it are used: {recording.damage}"
     faults = [str(fault) for fault in samples.faults]
     other = _another_geometry(notes, table)
-    said = (*damage, *unread, *other, *known.remarks, *faults, *session.remarks)
-    return replace(session, notes=notes, remarks=said)
+    said = (*unread, *other, *known.remarks, *faults, *session.remarks)
+    remarks = (damage, *said) if damage else said
+    return replace(session, notes=notes, remarks=remarks, damage=damage)
 
 
 def opened(

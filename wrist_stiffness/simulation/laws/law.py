@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wrist_stiffness.errors import InputError
+from wrist_stiffness.errors import InputError, meant
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.mechanism.vectors import block_diagonal, cross
@@ -30,11 +30,21 @@ class Law:
     law has a history of its own (so a function that remembers is a `partial` of its memory).  What
     hangs on the forces inside the wrist is found together with them: `Bending`, `Flowing`,
     `Rubbing`.
+
+    Raises `InputError` if a hook has no such name.
     """
 
     component: str
 
     def __init__(self, component: str = "", **hooks: Callable[..., Any]) -> None:
+        known = {
+            name
+            for each in type(self).__mro__[:-1]
+            for name in (*vars(each), *each.__annotations__)
+            if not name.startswith("_")
+        }
+        for name in hooks.keys() - known:
+            raise InputError(f"{type(self).__name__}: no hook {name!r}{meant(name, known)}")
         self.component = component
         vars(self).update(hooks)
 
