@@ -1,14 +1,17 @@
-"""What held-out units say of a set: the log odds of two multivariate normal densities."""
+"""What held-out units say of a set: their densities given the others, and their errors."""
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.held_out import refuted, speak_for
+from wrist_stiffness.inference.held_out import HeldOut, grows, speak_for
+from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.inference.point import Background, Group, Point
 
 N, HELD = 40, 12
+
+QUANTITIES = (Quantity("s", "um", (0, 1, 2), 1e6), Quantity("phi", "mdeg", (3, 4, 5), 1e3))
 
 
 def point(left, columns):
@@ -53,6 +56,19 @@ def test_odds_are_those_of_the_densities_given_what_was_seen(seed):
     assert odds == pytest.approx(exact[0] - exact[1], abs=1e-6)
 
 
-def test_what_is_foretold_worse_by_chance_is_not_refuted():
-    assert not refuted(-2.5)
-    assert refuted(-3.5)
+@pytest.mark.parametrize("seed", range(6))
+def test_an_effect_that_only_adds_noise_seldom_counts_as_one_that_makes_errors_grow(seed):
+    """Its level is 1 in 20, whatever the noise; an error half as large again is seen."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-9.0, 0.0)
+    before = size * rng.normal(size=(400, 80, 6))
+    same = size * rng.normal(size=(400, 80, 6))
+    judged = [
+        [
+            grows(HeldOut(one), HeldOut(two), QUANTITIES)
+            for one, two in zip(before, other, strict=True)
+        ]
+        for other in (same, 1.5 * same)
+    ]
+    assert np.mean(judged[0]) < 0.08
+    assert np.mean(judged[1]) > 0.9

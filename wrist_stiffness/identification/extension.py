@@ -19,7 +19,7 @@ from wrist_stiffness.identification.problem import FitProblem, require_units
 from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
-from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
+from wrist_stiffness.inference.held_out import HeldOut, bought, grows
 from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -52,7 +52,6 @@ class Extension:
     before: HeldOut
     after: HeldOut
     judged_by: str  # which those are
-    odds: float  # log odds by which these speak for the effect
 
     @cached_property
     def model(self) -> ErrorModel:
@@ -132,9 +131,9 @@ class Extension:
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
-        if refuted(self.odds):
+        if grows(self.before, self.after, self.quantities):
             out.append("the error on the unseen part GROWS: leave this effect out")
-        elif not refuted(-self.odds):
+        elif not grows(self.after, self.before, self.quantities):
             out.append("the error on the unseen part does not fall beyond chance")
         return tuple(out)
 
@@ -202,8 +201,7 @@ def extend(
         whole = fit_base(model, sessions_used, (), base.base, base=(free, held))
         base = WristFit(whole, problem.table)
     progress(STEPS, STEPS)
-    odds = judge.speak_for(grown, base)
-    return Extension(effect, found, base, before, after, judge.by, odds)
+    return Extension(effect, found, base, before, after, judge.by)
 
 
 def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:

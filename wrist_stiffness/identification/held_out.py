@@ -8,8 +8,7 @@ import numpy as np
 
 from wrist_stiffness.identification.base_fit import BaseFit, without_units
 from wrist_stiffness.identification.problem import FitProblem
-from wrist_stiffness.identification.wrist_fit import WristFit
-from wrist_stiffness.inference.held_out import HeldOut, sealed_units, speak_for
+from wrist_stiffness.inference.held_out import HeldOut, sealed_units
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.observing import without_mounting
@@ -68,15 +67,6 @@ class Judge:
 
     def _held_out(self, problem: FitProblem, residual: Array) -> HeldOut:
         return HeldOut(without_mounting(problem.table, residual)[self.aside])
-
-    def speak_for(self, found: WristFit, without: WristFit) -> float:
-        """Return by how much better effects foretell the held-out units: see `speak_for` there.
-
-        `found`, `without`: fits with and without them to all units of one table.
-        """
-        table = found.table
-        taken = table.without(self.aside)
-        return speak_for(found.point, without.point, table.background, taken)
 
     def _white(self, problem: FitProblem, values: Array) -> Array:
         return problem.whiten(values)[np.repeat(self.aside, problem.table.n_components)]

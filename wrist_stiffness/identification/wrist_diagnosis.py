@@ -11,7 +11,6 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.base_fit import BaseFit, fit_base, fit_cleaned
 from wrist_stiffness.identification.candidates import compensable, turns_normal
 from wrist_stiffness.identification.held_out import Judge
-from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import require_units
 from wrist_stiffness.identification.proposal import Proposals
 from wrist_stiffness.identification.proposing import propose
@@ -31,7 +30,7 @@ from wrist_stiffness.inference.answer import (
     standings,
 )
 from wrist_stiffness.inference.giving import told
-from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
+from wrist_stiffness.inference.held_out import HeldOut, bought, grows
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.search import TIME_OVER, Search, State
 from wrist_stiffness.mechanism.components import Array
@@ -129,8 +128,9 @@ def diagnose_sessions(
     search.run()
     reading = _settled(read(search, naming))
     tell("judging by what was held out")
-    judge = _Judged(model, units, search, reading.state.fit)
-    if reading.named and refuted(judge.odds):
+    judge = _Judged(model, units, search, reading.state.fit.base)
+    reported = problem.table.observations.reported
+    if grows(judge.before, judge.after, reported):
         # What the held-out part speaks against is not handed over.
         judge.after, reading = judge.before, _settled(reading.refute(search.base))
     proposals = None
@@ -143,7 +143,6 @@ def diagnose_sessions(
         _finding(search, e, reading, None) for e in reading.classes if e not in reading.named
     ]
     table = state.fit.table
-    reported = table.observations.reported
     diagnosis = Diagnosis(
         reading.verdict,
         reading.probability,
@@ -197,35 +196,22 @@ class _Judged:
     """An answer, judged by what was not seen."""
 
     def __init__(
-        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, found: WristFit
+        self, model: ErrorModel, whole: tuple[UnitSession, ...], search: Search, near: BaseFit
     ) -> None:
-        nominal: WristFit = search.base.fit
-        self._all = len(whole) == len(nominal.problem.sessions)
-        if not self._all:
-            base, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
-            nominal = WristFit(base, likelihood_of(base))
-        self._model, self._nominal, self._found = model, nominal, found
-        self._judge = Judge(nominal.base)
+        nominal: BaseFit = search.base.fit.base
+        if len(whole) > len(nominal.problem.sessions):
+            nominal, _ = fit_cleaned(replace(nominal.problem, sessions=whole))
+        self._model, self._judge, self._near = model, Judge(nominal), near
         self.scope = self._judge.by
-        self._effects = list(found.base.beyond().values())
         self.before = self._left([])
-        self.after = self._left(self._effects) if self._effects else self.before
-
-    @property
-    def odds(self) -> float:
-        """By how much better the answer foretells what was not seen than the nominal model."""
-        found, nominal = self._found, self._nominal
-        if not self._all:
-            sessions = nominal.problem.sessions
-            beside = fit_base(self._model, sessions, self._effects, found.base)
-            found = replace(found, base=beside, table=nominal.table)
-        return self._judge.speak_for(found, nominal)
+        effects = list(near.beyond().values())
+        self.after = self._left(effects) if effects else self.before
 
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
         """Return what is left by the model with some effects."""
         judge = self._judge
         # A pin that rests where it does leads back there; from the nominal model it may not.
-        near = self._found.base if effects else judge.whole
+        near = self._near if effects else judge.whole
         return judge.left(fit_base(self._model, judge.seen, effects, near))
 
     def without(self, fitted: BaseFit, name: str) -> HeldOut:

@@ -7,21 +7,24 @@ Of one session it is a part, without which what was found is fitted anew.  All o
 the effects, this part too: it judges their values, and hardly whether they are the right ones.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import stdtrit
 
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations, Quantity
 from wrist_stiffness.inference.point import Background, Point
-from wrist_stiffness.inference.search import NEGLIGIBLE
 
 HELD_OUT = 0.2
 """Part of the units that judges where there is one session only (assumed)."""
 
 JUDGES = 8
 """Blocks of the held-out part from which the uncertainty of a gain is taken."""
+
+CHANCE = 0.05
+"""Probability with which an effect that changes nothing counts as one that makes errors grow."""
 
 
 def time_blocks(sessions: Labels, wanted: int) -> Labels:
@@ -98,11 +101,6 @@ def _seen(point: Point, taken: Callable[[Array], Array]) -> Point:
     return replace(point, left=left, columns=columns, inexact=inexact)
 
 
-def refuted(odds: float) -> bool:
-    """Whether held-out units speak against a set beyond what chance explains."""
-    return odds < -NEGLIGIBLE
-
-
 def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, float]:
     """Fall of the held-out error of a quantity and its standard uncertainty.
 
@@ -118,3 +116,14 @@ def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, 
     level = before.rmse(quantity) + after.rmse(quantity)
     slope = quantity.per_si**2 / level if level > 0 else 0.0
     return before.rmse(quantity) - after.rmse(quantity), float(error * slope)
+
+
+def grows(before: HeldOut, after: HeldOut, quantities: Sequence[Quantity]) -> bool:
+    """Tell whether the held-out error of a quantity grows beyond chance, 1 in 20 over all of them.
+
+    `bought` against its own uncertainty, from blocks that are long beside what wanders (Student's
+    t): no noise need be stated.
+    """
+    falls = [bought(before, after, quantity) for quantity in quantities]
+    least = float(stdtrit(JUDGES - 1, CHANCE / len(falls)))
+    return any(fall < least * error for fall, error in falls)

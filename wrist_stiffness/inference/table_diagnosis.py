@@ -22,14 +22,14 @@ from wrist_stiffness.inference.answer import (
     standings,
 )
 from wrist_stiffness.inference.candidates import Candidate, Nuisance, nuisance_columns
-from wrist_stiffness.inference.held_out import HeldOut, bought, refuted, speak_for
+from wrist_stiffness.inference.held_out import HeldOut, bought, grows, speak_for
 from wrist_stiffness.inference.linear import LinearFit, LinearProblem
 from wrist_stiffness.inference.noise import in_each_component
 from wrist_stiffness.inference.observations import Array, Mask, Observations
 from wrist_stiffness.inference.outliers import FEWEST_UNITS, OUTLIER_LIMIT, lost_units
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.predictor import LEAST, PredictedSet, Predictor, predicted_set
-from wrist_stiffness.inference.search import Search, State
+from wrist_stiffness.inference.search import NEGLIGIBLE, Search, State
 from wrist_stiffness.inference.smooth import questions
 
 HELD_OUT = 5
@@ -130,7 +130,9 @@ def diagnose(
     tell("judging by what was held out")
     judge = _Judge(problem, whole, aside, nuisances, _noise(reading.state, problem.table))
     before, after = judge.left(search.base.fit), judge.left(reading.state.fit)
-    refused = bool(reading.named) and judge.refutes(search.base.fit, reading.state.fit)
+    refused = bool(reading.named) and (
+        grows(before, after, whole.reported) or judge.refutes(search.base.fit, reading.state.fit)
+    )
     if refused:
         after = before
         reading = reading.refute(search.base)
@@ -220,7 +222,7 @@ class _Judge:
         problem = self._all
         with_it, without = (problem.fitted(each.terms).point for each in (found, nominal))
         taken = problem.table.without(self._aside)
-        return refuted(speak_for(with_it, without, problem.background, taken))
+        return speak_for(with_it, without, problem.background, taken) < -NEGLIGIBLE
 
     def left(self, found: LinearFit, without: str = "") -> HeldOut:
         """Return what a set, or that without an effect, leaves of the unseen units.
