@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.held_out import HeldOut, grows, speak_for
+from wrist_stiffness.inference.held_out import HeldOut, bought, grows, speak_for
 from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.inference.point import Background, Group, Point
 
@@ -72,3 +72,16 @@ def test_an_effect_that_only_adds_noise_seldom_counts_as_one_that_makes_errors_g
     ]
     assert np.mean(judged[0]) < 0.08
     assert np.mean(judged[1]) > 0.9
+
+
+def test_what_a_right_change_takes_off_is_no_chance_wherever_it_is_large():
+    """Loads that come and go make the fall uneven in time, but not uncertain."""
+    rng = np.random.default_rng(3)
+    change = np.zeros((80, 6))
+    change[20:30] = 3.0 * rng.normal(size=(10, 6))
+    noise = rng.normal(size=(80, 6))
+    right, wrong = HeldOut(noise + change), HeldOut(noise)
+    assert grows(wrong, right, QUANTITIES)
+    assert not grows(right, wrong, QUANTITIES)
+    fall, error = bought(right, wrong, QUANTITIES[0])
+    assert fall > 4.0 * error > 0.0

@@ -65,13 +65,6 @@ class HeldOut:
         mean = total / np.maximum(measured.sum(axis=0), 1)
         return float(np.sqrt(mean.sum())) * quantity.per_si
 
-    def squares(self, quantity: Quantity) -> Array:
-        """Squared vector norm of each unit, (n,); NaN where no component was measured."""
-        columns = self.residual[:, list(quantity.components)]
-        measured = np.isfinite(columns)
-        total = np.sum(np.where(measured, columns, 0.0) ** 2, axis=1)
-        return np.where(measured.any(axis=1), total, np.nan)
-
 
 def speak_for(
     found: Point, without: Point, background: Background, taken: Callable[[Array], Array]
@@ -104,18 +97,27 @@ def _seen(point: Point, taken: Callable[[Array], Array]) -> Point:
 def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, float]:
     """Fall of the held-out error of a quantity and its standard uncertainty.
 
+    Of a change f that takes the share b of itself off the error, squares fall by (2 b - 1) f^2.  So
+    the uncertainty is that of b: of a regression on f whose errors may wander within blocks (Liang
+    and Zeger 1986).
+
     `before`, `after`: without and with the effect; `quantity`: what is told.
     """
-    fall = before.squares(quantity) - after.squares(quantity)
-    measured = np.isfinite(fall)
-    if not measured.any():
+    columns = list(quantity.components)
+    left, kept = (np.nan_to_num(each.residual[:, columns]) for each in (before, after))
+    change = left - kept
+    size = float(np.sum(change**2))
+    units = int(np.isfinite(before.residual[:, columns]).any(axis=1).sum())
+    if not size:
         return 0.0, 0.0
-    blocks = np.array_split(fall[measured], min(JUDGES, int(measured.sum())))
-    means = np.array([block.mean() for block in blocks])
-    error = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
+    error = left - float(np.sum(left * change)) / size * change
+    blocks = np.array_split(np.sum(error * change, axis=1), min(JUDGES, len(left)))
+    scores = np.array([block.sum() for block in blocks])
+    spread = len(blocks) / (len(blocks) - 1) if len(blocks) > 1 else np.inf
+    fall = 2.0 * float(np.sqrt(spread * np.sum(scores**2))) / units
     level = before.rmse(quantity) + after.rmse(quantity)
     slope = quantity.per_si**2 / level if level > 0 else 0.0
-    return before.rmse(quantity) - after.rmse(quantity), float(error * slope)
+    return before.rmse(quantity) - after.rmse(quantity), fall * slope
 
 
 def grows(before: HeldOut, after: HeldOut, quantities: Sequence[Quantity]) -> bool:
