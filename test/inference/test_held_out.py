@@ -58,7 +58,7 @@ def test_odds_are_those_of_the_densities_given_what_was_seen(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_an_effect_that_only_adds_noise_seldom_counts_as_one_that_makes_errors_grow(seed):
-    """Its level is 1 in 20, whatever the noise; an error half as large again is seen."""
+    """Its level is 1 in 100, whatever the noise; an error twice as large is seen."""
     rng = np.random.default_rng(seed)
     size = 10.0 ** rng.uniform(-9.0, 0.0)
     before = size * rng.normal(size=(400, 80, 6))
@@ -68,10 +68,10 @@ def test_an_effect_that_only_adds_noise_seldom_counts_as_one_that_makes_errors_g
             grows(HeldOut(one), HeldOut(two), QUANTITIES)
             for one, two in zip(before, other, strict=True)
         ]
-        for other in (same, 1.5 * same)
+        for other in (same, 2.0 * same)
     ]
-    assert np.mean(judged[0]) < 0.08
-    assert np.mean(judged[1]) > 0.9
+    assert np.mean(judged[0]) < 0.03
+    assert np.mean(judged[1]) > 0.8
 
 
 def test_what_a_right_change_takes_off_is_no_chance_wherever_it_is_large():

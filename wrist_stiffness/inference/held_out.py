@@ -23,7 +23,7 @@ HELD_OUT = 0.2
 JUDGES = 8
 """Blocks of the held-out part from which the uncertainty of a gain is taken."""
 
-CHANCE = 0.05
+CHANCE = 0.01
 """Probability with which an effect that changes nothing counts as one that makes errors grow."""
 
 
@@ -121,7 +121,7 @@ def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, 
 
 
 def grows(before: HeldOut, after: HeldOut, quantities: Sequence[Quantity]) -> bool:
-    """Tell whether the held-out error of a quantity grows beyond chance, 1 in 20 over all of them.
+    """Tell whether the held-out error of a quantity grows beyond chance, 1 in 100 over all of them.
 
     `bought` against its own uncertainty, from blocks that are long beside what wanders (Student's
     t): no noise need be stated.
