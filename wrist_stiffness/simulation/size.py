@@ -174,9 +174,10 @@ class Scale:
 
         magnitude = magnitude_for(measure, hidden.magnitude, size, limit)
         if magnitude is None:
+            unit = "" if entry.unit == "-" else f" {entry.unit}"
             raise InputError(
-                f"{hidden.effect}@{hidden.component}: size {size:g} is out of reach, at the limit "
-                f"of {limit:g} {entry.unit} it is {measure(limit):.3g}"
+                f"{hidden.effect}@{hidden.component}: size {size:g} is out of reach: with the "
+                f"largest effect that can be simulated, {limit:g}{unit}, it is {measure(limit):.3g}"
             )
         return replace(hidden, magnitude=magnitude)
 
