@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.held_out import HeldOut, bought, grows, speak_for
+from wrist_stiffness.inference.held_out import HeldOut, bought, speak_for
 from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.inference.point import Background, Group, Point
 
@@ -56,32 +56,12 @@ def test_odds_are_those_of_the_densities_given_what_was_seen(seed):
     assert odds == pytest.approx(exact[0] - exact[1], abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_an_effect_that_only_adds_noise_seldom_counts_as_one_that_makes_errors_grow(seed):
-    """Its level is 1 in 100, whatever the noise; an error twice as large is seen."""
-    rng = np.random.default_rng(seed)
-    size = 10.0 ** rng.uniform(-9.0, 0.0)
-    before = size * rng.normal(size=(400, 80, 6))
-    same = size * rng.normal(size=(400, 80, 6))
-    judged = [
-        [
-            grows(HeldOut(one), HeldOut(two), QUANTITIES)
-            for one, two in zip(before, other, strict=True)
-        ]
-        for other in (same, 2.0 * same)
-    ]
-    assert np.mean(judged[0]) < 0.03
-    assert np.mean(judged[1]) > 0.8
-
-
 def test_what_a_right_change_takes_off_is_no_chance_wherever_it_is_large():
     """Loads that come and go make the fall uneven in time, but not uncertain."""
     rng = np.random.default_rng(3)
     change = np.zeros((80, 6))
     change[20:30] = 3.0 * rng.normal(size=(10, 6))
     noise = rng.normal(size=(80, 6))
-    right, wrong = HeldOut(noise + change), HeldOut(noise)
-    assert grows(wrong, right, QUANTITIES)
-    assert not grows(right, wrong, QUANTITIES)
-    fall, error = bought(right, wrong, QUANTITIES[0])
+    before, after = (HeldOut(left, left.ravel()) for left in (noise + change, noise))
+    fall, error = bought(before, after, QUANTITIES[0])
     assert fall > 4.0 * error > 0.0

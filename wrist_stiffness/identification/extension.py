@@ -19,7 +19,7 @@ from wrist_stiffness.identification.problem import FitProblem, require_units
 from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
-from wrist_stiffness.inference.held_out import HeldOut, bought, grows
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
@@ -131,9 +131,9 @@ class Extension:
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
-        if grows(self.before, self.after, self.quantities):
+        if refuted(self.before, self.after):
             out.append("the error on the unseen part GROWS: leave this effect out")
-        elif not grows(self.after, self.before, self.quantities):
+        elif not refuted(self.after, self.before):
             out.append("the error on the unseen part does not fall beyond chance")
         return tuple(out)
 

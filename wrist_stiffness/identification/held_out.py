@@ -66,7 +66,8 @@ class Judge:
         return self._held_out(problem, problem.residual(np.empty(0)))
 
     def _held_out(self, problem: FitProblem, residual: Array) -> HeldOut:
-        return HeldOut(without_mounting(problem.table, residual)[self.aside])
+        shown = without_mounting(problem.table, residual)[self.aside]
+        return HeldOut(shown, self._white(problem, residual))
 
     def _white(self, problem: FitProblem, values: Array) -> Array:
         return problem.whiten(values)[np.repeat(self.aside, problem.table.n_components)]

@@ -30,7 +30,7 @@ from wrist_stiffness.inference.answer import (
     standings,
 )
 from wrist_stiffness.inference.giving import told
-from wrist_stiffness.inference.held_out import HeldOut, bought, grows
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.search import TIME_OVER, Search, State
 from wrist_stiffness.mechanism.components import Array
@@ -129,8 +129,7 @@ def diagnose_sessions(
     reading = _settled(read(search, naming))
     tell("judging by what was held out")
     judge = _Judged(model, units, search, reading.state.fit.base)
-    reported = problem.table.observations.reported
-    if grows(judge.before, judge.after, reported):
+    if refuted(judge.before, judge.after):
         # What the held-out part speaks against is not handed over.
         judge.after, reading = judge.before, _settled(reading.refute(search.base))
     proposals = None
@@ -143,6 +142,7 @@ def diagnose_sessions(
         _finding(search, e, reading, None) for e in reading.classes if e not in reading.named
     ]
     table = state.fit.table
+    reported = table.observations.reported
     diagnosis = Diagnosis(
         reading.verdict,
         reading.probability,

@@ -22,7 +22,7 @@ from wrist_stiffness.inference.answer import (
     standings,
 )
 from wrist_stiffness.inference.candidates import Candidate, Nuisance, nuisance_columns
-from wrist_stiffness.inference.held_out import HeldOut, bought, grows, speak_for
+from wrist_stiffness.inference.held_out import HeldOut, bought, speak_for
 from wrist_stiffness.inference.linear import LinearFit, LinearProblem
 from wrist_stiffness.inference.noise import in_each_component
 from wrist_stiffness.inference.observations import Array, Mask, Observations
@@ -130,9 +130,7 @@ def diagnose(
     tell("judging by what was held out")
     judge = _Judge(problem, whole, aside, nuisances, _noise(reading.state, problem.table))
     before, after = judge.left(search.base.fit), judge.left(reading.state.fit)
-    refused = bool(reading.named) and (
-        grows(before, after, whole.reported) or judge.refutes(search.base.fit, reading.state.fit)
-    )
+    refused = bool(reading.named) and judge.refutes(search.base.fit, reading.state.fit)
     if refused:
         after = before
         reading = reading.refute(search.base)
@@ -240,7 +238,7 @@ class _Judge:
         target = (residual / self._size).ravel()[rows]
         gram = flat.T @ flat + np.diag(1.0 / self._prior**2)
         set_up = np.linalg.lstsq(gram, flat.T @ target, rcond=1e-12)[0]
-        return HeldOut(residual - self._set_up @ set_up)
+        return HeldOut(residual - self._set_up @ set_up, target - flat @ set_up)
 
 
 def _noise(state: State, table: Table) -> Array:
