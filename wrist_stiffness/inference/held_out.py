@@ -20,7 +20,7 @@ HELD_OUT = 0.2
 """Part of the units that judges where there is one session only (assumed)."""
 
 JUDGES = 8
-"""Blocks of the held-out part from which the uncertainty of a gain is taken."""
+"""Blocks in time of the held-out part from which the uncertainty of a gain is taken."""
 
 
 def time_blocks(sessions: Labels, wanted: int) -> Labels:
@@ -115,10 +115,12 @@ def bought(before: HeldOut, after: HeldOut, quantity: Quantity) -> tuple[float, 
     if not size:
         return 0.0, 0.0
     error = left - float(np.sum(left * change)) / size * change
-    blocks = np.array_split(np.sum(error * change, axis=1), min(JUDGES, len(left)))
-    scores = np.array([block.sum() for block in blocks])
-    spread = len(blocks) / (len(blocks) - 1) if len(blocks) > 1 else np.inf
-    fall = 2.0 * float(np.sqrt(spread * np.sum(scores**2))) / units
+    # Of blocks without a change nothing is learned: each has an equal share of it.
+    weight = np.sum(change**2, axis=1)
+    block = np.floor(JUDGES * (np.cumsum(weight) - 0.5 * weight) / size).astype(np.int64)
+    scores, count = np.bincount(block, np.sum(error * change, axis=1)), len(set(block[weight > 0]))
+    spread = count / (count - 1) * np.sum(scores**2) if count > 1 else np.inf
+    fall = 2.0 * float(np.sqrt(spread)) / units
     level = before.rmse(quantity) + after.rmse(quantity)
     slope = quantity.per_si**2 / level if level > 0 else 0.0
     return before.rmse(quantity) - after.rmse(quantity), fall * slope

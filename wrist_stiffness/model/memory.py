@@ -55,7 +55,7 @@ def lag(values: Array, interval: Array, time_constant: float, before: Array, sta
     """
     steps = (interval / time_constant)[:, None]
     earlier = np.concatenate([before[None], values[:-1]])
-    # Of a straight step, what of its mean over the weights exp(-t) is not followed yet.
+    # x' = u - x for a straight u: of a step of u within h time constants x lacks (1 - e^-h) / h.
     gone = -np.expm1(-steps)
     late, decay = np.divide(gone, steps, out=np.ones_like(steps), where=steps > 0.0), 1.0 - gone
     followed = (1.0 - late) * values + (late - decay) * earlier
