@@ -114,21 +114,23 @@ def test_response_of_one_pose_is_that_of_the_operators(shipped, joints):
         constants = mechanism_constants(mechanism, ANYWHERE, limits_of())
         wrist, active = CompiledWrist(constants, parts, gravity), None
         loads = rng.normal(size=(len(theta), 6)) * [1.0, 1.0, 1.0, 0.02, 0.02, 0.02]
-        alone = []
+        alone, answers = [], []
         for each, load in zip(theta, loads, strict=True):
             configuration = mechanism.forward(each)
             wanted = respond(contact_operators(configuration, parts, gravity), load)
-            twist, force, closed = wrist.respond(configuration, load)
+            (twist,), (force,), (closed,) = wrist.respond(configuration.as_block, load[None])
             assert np.array_equal(closed, wanted.active)
             for part in (slice(0, 3), slice(3, 6)):
                 size = np.linalg.norm(wanted.twist[part])
                 assert np.linalg.norm(twist[part] - wanted.twist[part]) < ROUNDING * size
             assert np.allclose(force, wanted.force, rtol=1e-9, atol=1e-9)
-            guessed, _, active = wrist.respond(configuration, load, active)
+            (guessed,), _, (active,) = wrist.respond(configuration.as_block, load[None], active)
             assert np.array_equal(guessed, twist)
+            answers.append(twist)
             touched += np.count_nonzero(closed)
             first = np.zeros(wrist.sectors, dtype=bool)
             alone.append(wrist.predict(each, load, np.zeros(1, dtype=bool), first, None).twist[0])
+        assert np.array_equal(wrist.respond(mechanism.forward(theta), loads)[0], answers)
         first, in_f = np.zeros(wrist.sectors, dtype=bool), np.zeros(len(theta), dtype=bool)
         block = wrist.predict(theta, loads, in_f, first, None)
         assert not block.status.any()

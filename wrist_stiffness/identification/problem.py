@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -82,6 +82,10 @@ class Unknown:
         """Return its value so many steps from the mean, within the bounds."""
         own = self.parameter
         return min(max(self.mean + steps * self.step, own.lower), own.upper)
+
+
+def _as_held(effects: tuple[Effect, ...], held: Mapping[str, Effect]) -> tuple[Effect, ...]:
+    return tuple(held.get(each.name, each) for each in effects)
 
 
 def _together(one: Effect, other: Effect) -> Effect:
@@ -234,9 +238,9 @@ class FitProblem:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
         By one-sided differences, away from the nearer bound.  Where the parameter's effect does not
-        need the path, the difference is taken at mean moments, without the effects that have a
-        past: that is far quicker, and good enough for the slope.  Play stays: where a pin is free,
-        nothing else has the slope that it has without.
+        need the path, the difference is taken at mean moments, beside what effects with a past did
+        there: that is far quicker, and good enough for the slope.  Play is solved: where a pin is
+        free, nothing else has the slope that it has without.
 
         `z` (p,): steps from the prior means; `places`: which unknowns are asked for; all by
         default.
@@ -271,6 +275,7 @@ class FitProblem:
         values = self._values(z, number)
         effects = self._with_values(values)
         whole = (*self.model.effects, *effects)
+        held = model.held(whole)
         step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
         moved, trials, by_path = [], [], []
         for place in asked:
@@ -280,10 +285,12 @@ class FitProblem:
             other = self._moved(effects, values, unknown, float(z[place] + step[place]))
             trial = (*self.model.effects, *other)
             by_path.append(model.remembers((unknown.effect,)))
-            trials.append(trial if by_path[-1] else model.of_the_moment(trial))
+            if not by_path[-1]:
+                trial = _as_held(trial, held)
+            trials.append(trial)
             moved.append(place)
         path, quick, *changed = model.predicted(
-            [whole, model.of_the_moment(whole), *trials], [model.remembers(whole), False, *by_path]
+            [whole, _as_held(whole, held), *trials], [bool(held), False, *by_path]
         )
         twists = [
             path + twist - (path if on_path else quick)

@@ -8,13 +8,13 @@ same code in a loop, so live nodes and replay agree to the bit.
 
 from __future__ import annotations
 
+from copy import copy
 from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import CARRIER, ELASTIC, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.geometry import Limits
@@ -33,6 +33,13 @@ GROUPS = tuple(
     )
 )
 """Elastic components that lie in one limb and turn with one body."""
+
+
+OF_LOAD = slice(3, 10)
+OF_SCREWS = slice(10 + len(GROUPS) * (36 + 18), 10 + len(GROUPS) * (36 + 18 + 6))
+SECTOR = 14
+"""In `Parts` of `native/wrist.h`: factor and addition to the load, constant screws, numbers of a
+sector, of which the last one is its gap."""
 
 
 def mechanism_constants(
@@ -62,15 +69,8 @@ def mechanism_constants(
     )
 
 
-def parts_constants(
-    components: ElasticComponents,
-    gravity: Array,
-    screws: Array | None,
-    opening: Array | None,
-    load_scale: float,
-    load_added: Array | None,
-) -> Array:
-    """Return what `native` must know of the elastic parts and of what is constant."""
+def parts_constants(components: ElasticComponents, gravity: Array) -> Array:
+    """Return what `native` must know of the elastic parts."""
     sectors = components.sectors
     m, bodies = len(sectors.gap), len(BODIES)
     flexibility, weight_screw = np.zeros((len(GROUPS), 6, 6)), np.zeros((len(GROUPS), 6, 3))
@@ -89,16 +89,15 @@ def parts_constants(
             carried = here + components.weight_motor_side[k]
         weight[BODIES.index(CARRIER[names[0]])] = carried
     weight[BODIES.index("platform")] = components.platform_weight
-    gap = sectors.gap if opening is None else sectors.gap + opening
-    rows = [group_of, sectors.slide, sectors.screw, weight_gap, gap[:, None]]
+    rows = [group_of, sectors.slide, sectors.screw, weight_gap, sectors.gap[:, None]]
     return np.concatenate(
         [
             gravity,
-            [load_scale],
-            np.zeros(6) if load_added is None else load_added,
+            [1.0],
+            np.zeros(6),
             flexibility.ravel(),
             weight_screw.ravel(),
-            np.zeros(6 * len(GROUPS)) if screws is None else screws.ravel(),
+            np.zeros(6 * len(GROUPS)),
             weight.ravel(),
             np.hstack(rows).ravel(),
             sectors.approach.ravel(),
@@ -223,24 +222,32 @@ class CompiledWrist:
     """One wrist with all that is constant.
 
     `mechanism` (MECHANISM,): from `mechanism_constants`; `gravity` (3,): acceleration of gravity in
-    F [m/s^2]; `screws` (5, 6): constant screws of `GROUPS`, at O in the home frames of their bodies
-    [m, rad]; `opening` (m,): of the sectors beyond the components' gaps [m]; `load_scale`: factor
-    on what the load sensor says; `load_added` (6,): added to it then, in F [N, N m].
+    F [m/s^2].
     """
 
-    def __init__(
-        self,
-        mechanism: Array,
-        components: ElasticComponents,
-        gravity: Array,
-        screws: Array | None = None,
-        opening: Array | None = None,
-        load_scale: float = 1.0,
-        load_added: Array | None = None,
-    ) -> None:
+    def __init__(self, mechanism: Array, components: ElasticComponents, gravity: Array) -> None:
         self._mechanism = mechanism
         self.sectors = len(components.sectors.gap)
-        self._parts = parts_constants(components, gravity, screws, opening, load_scale, load_added)
+        self._parts = parts_constants(components, gravity)
+
+    def with_constants(
+        self, screws: Array | None, opening: Array | None, scale: float, added: Array | None
+    ) -> CompiledWrist:
+        """Return the wrist with further constants.
+
+        `screws` (5, 6): of `GROUPS`, at O in the home frames of their bodies [m, rad]; `opening`
+        (m,): of the sectors [m]; `scale`: factor on what the load sensor says; `added` (6,): to
+        that then, in F [N, N m].
+        """
+        other, parts = copy(self), self._parts.copy()
+        sectors = parts[native.PARTS :][: SECTOR * self.sectors].reshape(-1, SECTOR)
+        parts[OF_LOAD.start] *= scale
+        places = parts[OF_LOAD][1:], parts[OF_SCREWS], sectors[:, -1]
+        for place, more in zip(places, (added, screws, opening), strict=True):
+            if more is not None:
+                place += np.ravel(more)
+        other._parts = parts
+        return other
 
     def forward(self, theta: Array) -> tuple[Configuration, Flags]:
         """Return the configurations at motor angles (n, 2) [rad], and which lie in the domain (n,).
@@ -260,25 +267,27 @@ class CompiledWrist:
         limb_1: Array | None = None,
         limb_2: Array | None = None,
         opening: Array | None = None,
-    ) -> tuple[Array, Array, Flags]:
-        """Solve for the platform's twist under a load, with contact and own weight.
+    ) -> tuple[Array, Array, Flags] | None:
+        """Solve for the platform's twist under loads, with contact and own weight.
 
-        `wrench` (6,): load on the platform at O in F, as it acts [N, N m].  `active` (m,): first
-        guess of the sectors in contact; leaves no trace in the result.  `limb_1`, `limb_2` (6,):
-        further screws in the limbs at O in F [m, rad].  `opening` (m,): further opening of the
-        sectors [m].  Gives `twist` (6,): of the platform at O in F, first order [m, rad], `force`
-        (m,): of each sector [N], and `active` (m,): sectors in contact.  Raises `InputError` if the
-        flanges' flexibility is not positive definite.
+        `configuration`: of shape (n,); `wrench` (n, 6): load on the platform at O in F, as it acts
+        [N, N m].  `active` (m,) or (n, m): first guess of the sectors in contact; leaves no trace
+        in the result.  `limb_1`, `limb_2` (n, 6): further screws in the limbs at O in F [m, rad].
+        `opening` (n, m): further opening of the sectors [m].  Gives `twist` (n, 6): of the platform
+        at O in F, first order [m, rad], `force` (n, m): of each sector [N], and `active` (n, m):
+        sectors in contact; or None where a sample has no answer, and `solve_contacts` says why.
         """
-        twist, force = np.empty(6), np.empty(self.sectors)
-        closed = np.zeros(self.sectors, dtype=bool) if active is None else active.copy()
-        extras = (
-            None if e is None else np.ascontiguousarray(e, float) for e in (limb_1, limb_2, opening)
+        n = len(wrench)
+        twist, force = np.empty((n, 6)), np.empty((n, self.sectors))
+        closed = np.zeros((n, self.sectors), dtype=bool)
+        if active is not None:
+            closed[...] = active
+        arrays = (
+            None if e is None else np.ascontiguousarray(e, float)
+            for e in (configuration.row, wrench, limb_1, limb_2, opening)
         )
-        row = configuration.row
-        wrench = np.ascontiguousarray(wrench, float)
-        if native.respond(self._parts, row, wrench, *extras, closed, twist, force, self.sectors):
-            raise InputError(NOT_DEFINITE)
+        if native.respond(self._parts, *arrays, closed, twist, force, self.sectors):
+            return None
         return twist, force, closed
 
     def predict(

@@ -37,7 +37,7 @@ class Configuration:
     bodies: Array  # (..., 5, 3, 3), rotation of each of `BODIES` from home
     if TYPE_CHECKING:
         row: ClassVar[Array]
-        """The numbers of one pose, (66,)."""
+        """The numbers of each pose, (..., 66)."""
 
     @classmethod
     def of_row(cls, row: Array) -> Configuration:
@@ -52,7 +52,9 @@ class Configuration:
     def __getattr__(self, name: str) -> Array:
         """Return a field of `of_row`, or the row of the fields."""
         if name == "row":
-            value = np.concatenate([np.ravel(getattr(self, each.name)) for each in fields(self)])
+            shape = np.shape(self.singularity)
+            parts = [np.reshape(getattr(self, each.name), (*shape, -1)) for each in fields(self)]
+            value = np.concatenate(parts, axis=-1)
         elif name in _PLACES and "row" in vars(self):
             begin, end, shape = _PLACES[name]
             value = self.row[..., begin:end].reshape((*self.row.shape[:-1], *shape))

@@ -6,12 +6,12 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import ELASTIC, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.influence import Influence, influence
+from wrist_stiffness.mechanism.influence import IN_LIMB_1, Influence, influence
 from wrist_stiffness.mechanism.statics import (
     component_rotations,
     turned_flexibilities,
 )
-from wrist_stiffness.mechanism.vectors import block_diagonal
+from wrist_stiffness.mechanism.vectors import block_diagonal, both_halves
 
 
 def component_wrenches(
@@ -28,6 +28,19 @@ def component_wrenches(
     push = (force @ components.sectors.slide)[..., None, None, :]
     halves[..., :1, :] += push @ projectors.slides()
     return np.asarray(halves.reshape(*halves.shape[:-2], 6))
+
+
+def component_wrench(
+    projectors: Influence, components: ElasticComponents, k: int, wrench: Array, force: Array
+) -> Array:
+    """Return the same through component k of `ELASTIC` alone, (..., 6)."""
+    first = IN_LIMB_1[k]
+    carried = both_halves(
+        np.swapaxes(projectors.limb_1 if first else projectors.limb_2, -1, -2), wrench
+    )
+    push = (force @ components.sectors.slide)[..., None, :] @ projectors.slides_limb_1
+    carried[..., :3] += push[..., 0, :] if first else -push[..., 0, :]
+    return carried
 
 
 def component_screws(

@@ -6,6 +6,8 @@ axes of F: T_actual = T_err T_nominal.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -29,10 +31,11 @@ def exp_twist(twist: Array) -> tuple[Array, Array]:
     `twist` (..., 6): (translation; rotation) at O in F [m, rad].  Gives `rotation` (..., 3, 3):
     rotation matrix, and `shift` (..., 3): where the point at O goes [m].
     """
-    if twist.ndim == 1 and native is not None:
-        rotation, shift = np.empty((3, 3)), np.empty(3)
-        native.exp_twist(np.ascontiguousarray(twist, float), rotation, shift)
-        return rotation, shift
+    if native is not None:
+        rows = np.ascontiguousarray(twist, float).reshape(-1, 6)
+        rotations, shifts = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
+        native.exp_twist(rows, rotations, shifts)
+        return rotations.reshape(*twist.shape[:-1], 3, 3), shifts.reshape(*twist.shape[:-1], 3)
     v, w = twist[..., :3], twist[..., 3:]
     angle = np.sqrt(dot(w, w))[..., None]
     small = angle < SMALL_ANGLE
@@ -93,11 +96,13 @@ def log_motion(rotation: Array, shift: Array) -> Array:
     `rotation` (..., 3, 3): rotation matrix, angle below pi; `shift` (..., 3): where the point at O
     goes [m].  Gives (..., 6): twist at O in F [m, rad].
     """
-    if shift.ndim == 1 and native is not None:
-        twist = np.empty(6)
-        one = np.ascontiguousarray(rotation, float), np.ascontiguousarray(shift, float)
-        if not native.log_motion(*one, twist):
-            return twist
+    if native is not None:
+        shape = np.broadcast_shapes(rotation.shape[:-2], shift.shape[:-1])
+        rotations = np.ascontiguousarray(np.broadcast_to(rotation, (*shape, 3, 3)), float)
+        shifts = np.ascontiguousarray(np.broadcast_to(shift, (*shape, 3)), float)
+        twists = np.empty((math.prod(shape), 6))
+        if not native.log_motion(rotations, shifts, twists):
+            return twists.reshape(*shape, 6)
     w = rotation_vector(rotation)
     angle = np.sqrt(dot(w, w))[..., None]
     small = angle < SMALL_ANGLE

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import chain, repeat
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.contribution import Contribution
 from wrist_stiffness.model.evaluation import (
     NO_GUESSES,
     Evaluated,
@@ -23,7 +24,6 @@ from wrist_stiffness.model.evaluation import (
 )
 from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.prediction import BlockPrediction
-from wrist_stiffness.model.situation import BlockStatics
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -42,12 +42,18 @@ class Recent:
     """What the first of the last models did at a block, and what it rests on.
 
     The next ones often begin with it again.
+
+    Attributes
+    ----------
+    added : list of dict of str to Contribution
+        What its effects added to each chunk, by their names, but for constant ones.
     """
 
     def __init__(self) -> None:
+        self.added: list[dict[str, Contribution]] = []
         self._model: ErrorModel | None = None
         self._chunks: list[Evaluated] = []
-        self._statics: list[BlockStatics] = []
+        self._begun: list[dict[str, Any]] = []
 
     def like(self, model: ErrorModel) -> ErrorModel:
         """Return the known model if it is the same as one; else this one, from now on known."""
@@ -55,23 +61,31 @@ class Recent:
         if known is not None and _same(known, model):
             return known
         alike = known is not None and _alike(known, model)
-        begun = [each.situations[0].statics for each in self._chunks if alike]
-        self._statics = [each.without_operators(each.parts) for each in begun]
-        self._model, self._chunks = model, []
+        self._begun = [_begun(each, model) for each in self._chunks if alike]
+        self._model, self._chunks, self.added = model, [], []
         return model
 
     def chunk(self, number: int, evaluated: Callable[..., Evaluated]) -> Evaluated:
         """Return what the known model did at a chunk, evaluated now if need be.
 
-        `evaluated` takes the `statics` of the chunk with which an earlier model began, if any.
+        `evaluated` takes the `statics` and the `guess` of an earlier model, where there was one.
         """
         if number < len(self._chunks):
             return self._chunks[number]
-        known = self._statics[number : number + 1]
-        found = evaluated(statics=known[0] if known else None)
+        found = evaluated(**self._begun[number] if number < len(self._begun) else {})
         if number < MOST_KEPT:
             self._chunks.append(found)
+        if number == len(self.added):
+            self.added.append({each.effect.name: each.added for each in found.known.values()})
         return found
+
+
+def _begun(known: Evaluated, model: ErrorModel) -> dict[str, Any]:
+    """Return what another model may take over of what one did at a chunk."""
+    statics = known.situations[0].statics
+    if statics.parts is not model.parts:
+        statics = statics.without_operators(statics.parts)
+    return {"statics": statics, "guess": known.active}
 
 
 def _alike(one: ErrorModel, other: ErrorModel) -> bool:

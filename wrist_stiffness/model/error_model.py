@@ -102,6 +102,7 @@ class ErrorModel:
             if each.law.constant
         )
         vars(other).update(parts=self.parts, home=self.home, _at_home=constants)
+        vars(other)["_compiled_parts"] = self._compiled_parts
         if {id(effect) for effect, _ in constants} == known.keys():
             vars(other)["constants"] = self.constants
         return other
@@ -151,17 +152,18 @@ class ErrorModel:
     @cached_property
     def compiled(self) -> CompiledWrist | None:
         """The closed form with all that is constant, compiled; None where that cannot be had."""
-        if self.evaluation == "spline" or not compilable(self.parts):
+        if self._compiled_parts is None:
             return None
         own = self.constants
+        scale = 1.0 + sum(share or 0.0 for share in self._load_shares)
+        return self._compiled_parts.with_constants(own.screws, own.gap, scale, own.wrench)
+
+    @cached_property
+    def _compiled_parts(self) -> CompiledWrist | None:
+        if self.evaluation == "spline" or not compilable(self.parts):
+            return None
         return CompiledWrist(
-            self.table.workspace.constants,
-            self.parts,
-            self.table.geometry.gravity,
-            own.screws,
-            own.gap,
-            1.0 + sum(share or 0.0 for share in self._load_shares),
-            own.wrench,
+            self.table.workspace.constants, self.parts, self.table.geometry.gravity
         )
 
     @cached_property

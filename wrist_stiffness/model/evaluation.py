@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.contact import solve_contacts
@@ -153,17 +152,20 @@ def evaluate(
     pose: Configuration | None = None,
     near: Guesses = NO_GUESSES,
     statics: BlockStatics | None = None,
+    guess: NDArray[np.bool_] | None = None,
 ) -> Evaluated:
     """Evaluate a model over a block.
 
     `block`: n > 0 samples inside the table's domain and load range; `memory`: what the block before
     left, None at the start; `pose`: the configuration of a block of one sample, where it is known;
     `near`: where effects whose states are guesses ended at this block before, by their names;
-    `statics`: of this block, where another model of the same table was evaluated.
+    `statics`, `guess`: of this block and of the contact state at its moments, (n, m), where another
+    model of the same table was evaluated.
     """
-    guess = None if memory is None else memory.active
+    if guess is None and memory is not None:
+        guess = memory.active
     if statics is not None:
-        start = Situation(statics.with_parts(model.parts), model.constants, guess=guess)
+        start = _begun(model, statics.with_parts(model.parts), guess)
         return _staged(model, start, memory, None, near)
     if block.theta_dot is None:
         before = None if memory is None else (memory.time, memory.theta)
@@ -188,8 +190,8 @@ def evaluate_beside(
     ]
     at = like.situation
     open_ones = [each.situation for each in every if "answer" not in vars(each.situation)]
-    alike = [other for other in open_ones if other.statics is at.statics]
-    if alike and at.wrist is None:
+    alike = [each for each in open_ones if each.statics is at.statics and each.wrist is None]
+    if alike:
         gaps = np.stack([other.free[1] for other in alike], axis=1)
         force, active = solve_contacts(at.operators.approach, gaps, like.active[:, None])
         pushed = force @ np.swapaxes(at.operators.force_twist, -1, -2)
@@ -206,8 +208,7 @@ def _start(model: ErrorModel, like: Evaluated) -> Situation:
     statics = start.statics
     if start.parts is not model.parts:
         statics = statics.with_parts(model.parts)
-    wrist = None if start.wrist is None else _wrist(model, start.wrist[1])
-    return Situation(statics, model.constants, guess=like.active, wrist=wrist)
+    return _begun(model, statics, like.active)
 
 
 def situation_of(
@@ -222,12 +223,11 @@ def situation_of(
     if block.load_on_platform:
         load = both_halves(configuration.platform, load)
     statics = BlockStatics(block, load, configuration, model.evaluation, model.table, model.parts)
-    wrist = None if pose is None else _wrist(model, pose)
-    return Situation(statics, model.constants, guess=guess, wrist=wrist)
+    return _begun(model, statics, guess)
 
 
-def _wrist(model: ErrorModel, pose: Configuration) -> tuple[CompiledWrist, Configuration] | None:
-    return None if model.compiled is None else (model.compiled, pose)
+def _begun(model: ErrorModel, statics: BlockStatics, guess: NDArray[np.bool_] | None) -> Situation:
+    return Situation(statics, model.constants, guess=guess, wrist=model.compiled)
 
 
 def seen_by(results: Sequence[Evaluated]) -> Array:
@@ -300,7 +300,7 @@ def _after(
         other = like.added(SAMPLE_STAGES[number])
         if len(other) == len(added) and all(map(is_, other, added)):
             return like.situations[number + 1]
-    return at.with_more(sum(added, at.given))
+    return at.with_more(sum(added, NOTHING))
 
 
 def home_of(table: Table, parts: ElasticComponents) -> Situation:

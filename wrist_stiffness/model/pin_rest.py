@@ -113,8 +113,8 @@ class Pin:
         force = known = np.stack([np.asarray(each.force) for each in rubbing], axis=1)
         more, feet = NOTHING, []
         for number in range(PASSES):
-            rubbed = at.with_more(at.given + more)
-            loose = rubbed.with_more(rubbed.given + self._screw(x))
+            rubbed = at.with_more(more)
+            loose = rubbed.with_more(self._screw(x))
             surface = _dragged_by(drag, x)
             bristles = [
                 replace(each, force=force[:, j]).bristles(loose) for j, each in enumerate(rubbing)

@@ -13,7 +13,11 @@ from wrist_stiffness.mechanism.compiled import CompiledWrist
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import BODIES, Configuration
 from wrist_stiffness.mechanism.contact import forces_of, solve_contacts
-from wrist_stiffness.mechanism.energy import component_wrenches, flange_screws
+from wrist_stiffness.mechanism.energy import (
+    component_wrench,
+    component_wrenches,
+    flange_screws,
+)
 from wrist_stiffness.mechanism.influence import IN_LIMB_1, Influence, influence
 from wrist_stiffness.mechanism.statics import (
     ContactOperators,
@@ -135,8 +139,7 @@ class Situation:
     constants: Constants = Constants()  # sum of what the model's constant effects add
     given: Contribution = NOTHING  # sum of what its other effects added in earlier stages
     guess: NDArray[np.bool_] | None = None  # (m,) or (n, m), first guess of the contact state
-    # of one sample alone: its pose, and the compiled formulas with the model's constants
-    wrist: tuple[CompiledWrist, Configuration] | None = None
+    wrist: CompiledWrist | None = None  # the compiled formulas with the model's constants
 
     @property
     def block(self) -> Block:
@@ -242,42 +245,53 @@ class Situation:
     @cached_property
     def contact(self) -> tuple[Array, NDArray[np.bool_]]:
         """Forces (n, m) [N] and state (n, m) of the flanges under all that was added so far."""
-        if self.wrist is not None:
-            return self.answer[1:]
+        if self.solved:
+            return self.solved[1:]
         return solve_contacts(self.operators.approach, self.free[1], self.guess)
 
     @cached_property
     def answer(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Twist (n, 6) under all that was added so far, and the `contact` that belongs to it."""
+        if self.solved:
+            return self.solved
+        force, active = self.contact
+        twist = self.free[0] + (self.operators.force_twist @ force[..., None])[..., 0]
+        return twist, force, active
+
+    @cached_property
+    def solved(self) -> tuple[Array, Array, NDArray[np.bool_]] | None:
+        """The same by the compiled formulas, None where they do not serve."""
         if self.wrist is None:
-            force, active = self.contact
-            twist = self.free[0] + (self.operators.force_twist @ force[..., None])[..., 0]
-            return twist, force, active
-        given, guess = self.given, self.guess
+            return None
+        given = self.given
         limb_1, limb_2, gap = given.limb_1, given.limb_2, given.gap
         if given.through is not None:
             bent = (self.statics.turned_flexibility @ given.through[..., None])[..., 0]
             limb_1 = together(limb_1, bent[:, IN_LIMB_1].sum(axis=1))
             limb_2 = together(limb_2, bent[:, ~IN_LIMB_1].sum(axis=1))
             gap = together(gap, self._opened(given.through))
-        compiled, pose = self.wrist
-        added = (None if value is None else value[0] for value in (limb_1, limb_2, gap))
-        flags = None if guess is None else np.asarray(guess).reshape(-1)
-        twist, force, active = compiled.respond(pose, self.wrench[0], flags, *added)
-        rows = twist[None] if given.both is None else twist[None] + given.both
-        return rows, force[None], active[None]
+        found = self.wrist.respond(self.configuration, self.wrench, self.guess, limb_1, limb_2, gap)
+        if found is None or given.both is None:
+            return found
+        return found[0] + given.both, *found[1:]
 
     @property
     def contact_force(self) -> Array:
         """Force of the flange sectors under all that earlier stages added, (n, m) [N]."""
         return self.contact[0]
 
-    def with_more(self, given: Contribution) -> Situation:
-        """Return the situation after a further stage, with all that was given so far."""
-        known, guess = self.__dict__.get("contact"), self.guess
-        if known is not None:
-            guess = known[1]
-        return Situation(self.statics, self.constants, given, guess, self.wrist)
+    def with_more(self, added: Contribution) -> Situation:
+        """Return the situation after a further stage that added this, with what is known of it."""
+        known, guess = vars(self), self.guess
+        if "contact" in known:
+            guess = self.contact[1]
+        other = Situation(self.statics, self.constants, self.given + added, guess, self.wrist)
+        if "acting" in known:
+            vars(other)["acting"] = self.acting + added
+        if "free" in known:
+            (twist, gap), more = self.free, self.carried(added)
+            vars(other)["free"] = twist + more[0], gap + more[1]
+        return other
 
     @cached_property
     def through(self) -> Array:
@@ -299,12 +313,18 @@ class Situation:
             return self.through_place("motor_1") + self.through_place("motor_2")
         if place == "platform":
             return self.wrench
-        return self.through[:, ELASTIC.index(MOTOR_JOINT.get(place, place))]
+        k = ELASTIC.index(MOTOR_JOINT.get(place, place))
+        if "through" in vars(self):
+            return self.through[:, k]
+        through = self.statics.own_weight[:, k] + component_wrench(
+            self.influence, self.parts, k, self.wrench, self.contact_force
+        )
+        return through if self.acting.through is None else through + self.acting.through[:, k]
 
     def elastic_screw(self, place: str) -> Array:
         """Return C_k W_k of a link or bushing, (n, 6) at O in F [m, rad]."""
-        k = ELASTIC.index(place)
-        return (self.statics.turned_flexibility[:, k] @ self.through[:, k, :, None])[..., 0]
+        bent = self.statics.turned_flexibility[:, ELASTIC.index(place)]
+        return (bent @ self.through_place(place)[..., None])[..., 0]
 
     def elastic_share(self, place: str, fraction: Array) -> Contribution:
         """Return fractions (n,) of the elastic screw of a link or bushing as a contribution."""

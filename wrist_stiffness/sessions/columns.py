@@ -15,6 +15,7 @@ from wrist_stiffness.model.batch import Recent
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.held import held
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 Effects = tuple[Effect, ...]
@@ -46,9 +47,17 @@ class SessionModel:
         """Tell whether any of the effects needs the path and not the mean moment alone."""
         return any(self._has_memory(effect) for effect in effects)
 
-    def of_the_moment(self, effects: Effects) -> Effects:
-        """Return those effects whose slope the mean moment shows: all that have no past."""
-        return tuple(each for each in effects if not self._has_memory(each))
+    def held(self, effects: Effects) -> dict[str, Effect]:
+        """Return those effects that need the path as they are in the mean over each unit."""
+        remembering = [each for each in effects if self._has_memory(each)]
+        if not remembering:
+            return {}
+        self._batch([effects], Moments.PATH)
+        chunks = self.session.known[Moments.PATH].added
+        return {
+            each.name: held(each, [chunk[each.name] for chunk in chunks], self.session.mean)
+            for each in remembering
+        }
 
     def _has_memory(self, effect: Effect) -> bool:
         return effect.law.many_waves or self._has_past(effect)

@@ -109,18 +109,31 @@ static PyObject *forward_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     return PyLong_FromLong(first);
 }
 
+/* Parts, configurations (n, 66), wrenches (n, 6), screws in both limbs (n, 6) and openings (n, m) or
+ * None, contact states (n, m) to begin with; twists (n, 6), forces (n, m); m.  Returns the first status
+ * that is not OK. */
 static PyObject *respond_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
-    const Py_ssize_t six = 6 * sizeof(double);
     long m;
     if (counted(count, 10) || sectors(args[9], &m)) return 0;
-    const Py_ssize_t row = m * sizeof(double);
-    const Py_ssize_t sizes[] = {parts_size(m), sizeof(Configuration), six, six, six, row,
-                                m, six, row};
+    const Py_ssize_t n = PyObject_Length(args[7]), real = sizeof(double);
+    if (n < 0) return 0;
+    const Py_ssize_t six = 6 * n * real, row = n * m * real;
+    const Py_ssize_t sizes[] = {parts_size(m), n * (Py_ssize_t)sizeof(Configuration), six, six, six,
+                                row, n * m, six, row};
     Buffers b;
     if (take(&b, args, sizes, "ddddddbdd", 7u << 6)) return 0;
-    const int status = respond(b.view[0].buf, (int)m, b.view[1].buf, b.view[2].buf, b.view[3].buf,
-                               b.view[4].buf, b.view[5].buf, b.view[6].buf, b.view[7].buf,
-                               b.view[8].buf);
+    const Configuration *at = b.view[1].buf;
+    const double *wrench = b.view[2].buf, *limb_1 = b.view[3].buf, *limb_2 = b.view[4].buf;
+    const double *opening = b.view[5].buf;
+    unsigned char *closed = b.view[6].buf;
+    double *twist = b.view[7].buf, *force = b.view[8].buf;
+    int status = OK;
+    Py_BEGIN_ALLOW_THREADS
+    for (Py_ssize_t i = 0; i < n && !status; i++)
+        status = respond(b.view[0].buf, (int)m, at + i, wrench + 6 * i, limb_1 ? limb_1 + 6 * i : 0,
+                         limb_2 ? limb_2 + 6 * i : 0, opening ? opening + m * i : 0,
+                         closed + m * i, twist + 6 * i, force + m * i);
+    Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(status);
 }
@@ -349,20 +362,36 @@ static PyObject *covariance_of(PyObject *self, PyObject *const *args, Py_ssize_t
     Py_RETURN_NONE;
 }
 
+/* Twists (n, 6) to rotations (n, 3, 3) and shifts (n, 3). */
 static PyObject *exp_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
-    const Py_ssize_t sizes[] = {6 * sizeof(double), 9 * sizeof(double), 3 * sizeof(double)};
+    const Py_ssize_t real = sizeof(double);
+    if (counted(count, 3)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[2]);
+    if (n < 0) return 0;
+    const Py_ssize_t sizes[] = {6 * n * real, 9 * n * real, 3 * n * real};
     Buffers b;
-    if (counted(count, 3) || take(&b, args, sizes, "ddd", 6u)) return 0;
-    exp_twist(b.view[0].buf, b.view[1].buf, b.view[2].buf);
+    if (take(&b, args, sizes, "ddd", 6u)) return 0;
+    const double *twist = b.view[0].buf;
+    double *rotation = b.view[1].buf, *shift = b.view[2].buf;
+    for (Py_ssize_t i = 0; i < n; i++) exp_twist(twist + 6 * i, rotation + 9 * i, shift + 3 * i);
     release(&b);
     Py_RETURN_NONE;
 }
 
+/* Rotations (n, 3, 3) and shifts (n, 3) to twists (n, 6).  Returns the first status that is not OK. */
 static PyObject *log_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
-    const Py_ssize_t sizes[] = {9 * sizeof(double), 3 * sizeof(double), 6 * sizeof(double)};
+    const Py_ssize_t real = sizeof(double);
+    if (counted(count, 3)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[2]);
+    if (n < 0) return 0;
+    const Py_ssize_t sizes[] = {9 * n * real, 3 * n * real, 6 * n * real};
     Buffers b;
-    if (counted(count, 3) || take(&b, args, sizes, "ddd", 4u)) return 0;
-    const int status = log_motion(b.view[0].buf, b.view[1].buf, b.view[2].buf);
+    if (take(&b, args, sizes, "ddd", 4u)) return 0;
+    const double *rotation = b.view[0].buf, *shift = b.view[1].buf;
+    double *twist = b.view[2].buf;
+    int status = OK;
+    for (Py_ssize_t i = 0; i < n && !status; i++)
+        status = log_motion(rotation + 9 * i, shift + 3 * i, twist + 6 * i);
     release(&b);
     return PyLong_FromLong(status);
 }
@@ -372,7 +401,7 @@ static PyObject *log_of(PyObject *self, PyObject *const *args, Py_ssize_t count)
 
 static PyMethodDef METHODS[] = {
     FAST("forward", forward_of, "Fill the configurations of n poses in the domain."),
-    FAST("respond", respond_of, "Fill twist, force and contact state at one configuration."),
+    FAST("respond", respond_of, "Fill twists, forces and contact states at n configurations."),
     FAST("settle", settle_of, "Fill contact states and forces of n times t problems."),
     FAST("hold", hold_of, "Fill the forces that hold the sectors of n samples closed."),
     FAST("predict", predict_of, "Fill twists and configurations of n samples in their order."),
@@ -380,8 +409,8 @@ static PyMethodDef METHODS[] = {
     FAST("read_load", read_of, "Fill what n loads say of a payload."),
     FAST("pose_of_twist", pose_of, "Fill positions and quaternions of n twists."),
     FAST("table_covariance", covariance_of, "Fill the covariances of n predictions."),
-    FAST("exp_twist", exp_of, "Fill rotation and shift of one twist."),
-    FAST("log_motion", log_of, "Fill the twist of one motion; not 0 where it turns too far."),
+    FAST("exp_twist", exp_of, "Fill rotations and shifts of n twists."),
+    FAST("log_motion", log_of, "Fill the twists of n motions; not 0 where one turns too far."),
     {0, 0, 0, 0},
 };
 
