@@ -214,6 +214,22 @@ def test_columns_are_the_derivative_of_the_residual(model):
         assert np.max(np.abs(columns[:, :, place] - central) / scale) < 0.05
 
 
+def test_columns_in_motion_beside_an_effect_with_a_past_are_the_derivative_too(model):
+    pull = effect("cable_wrench@platform", fx_N=8.0, fz_1_N_per_rad=20.0, hysteresis_deg=4.0)
+    session = simulated(model, seconds=30.0)
+    free = [each for each in commissioning(model)[0] if each.effect.law.id != "flange_contact"]
+    problem = problem_of(model.with_effects(pull), [session], free)
+    z = np.full(len(problem.unknowns), 0.2)
+    columns = problem.columns(z)
+    off = []
+    for place, step in enumerate(1e-3 * np.eye(len(z))):
+        central = (problem.residual(z + step) - problem.residual(z - step)) / 2e-3
+        off.append(np.linalg.norm(columns[:, :, place] - central) / np.linalg.norm(central))
+    # Moments at which a flange is about to touch have two derivatives.
+    assert max(off) < 0.15
+    assert np.median(off) < 1e-3
+
+
 def test_lost_beams_do_not_move_the_fit(model):
     rng = np.random.default_rng(7)
     true = effect("bushing_stiffness@joint_1", flexibility_percent=40.0)

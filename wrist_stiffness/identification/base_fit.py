@@ -18,7 +18,7 @@ from wrist_stiffness.identification.free_effects import (
     commissioning,
     within_tolerances,
 )
-from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.identification.problem import FitProblem, Unknown
 from wrist_stiffness.identification.questions import smooth_columns
 from wrist_stiffness.inference.outliers import OUTLIER_LIMIT, lost_units
 from wrist_stiffness.mechanism.components import Array
@@ -184,14 +184,14 @@ def fit_base(
     if 0 < count < len(more):
         firm = replace(alone, free=(*free, *more[:count]))
     z = _start(problem, start, added)
-    near = _near(problem, start, len(free)) if start is not None and same else None
+    near, known = _near(problem, start) if start is not None and same else (None, None)
     for force in ROUNDED_N if gradually else ():
         rounded = [replace(each, effect=_rounded(each.effect, force)) for each in more]
         easy = replace(problem, free=(*free, *rounded))
-        found = _descended(easy, alone, easy, z, NEARLY, near)
+        found = _descended(easy, alone, easy, z, NEARLY, near, known)
         z, near = found.z, found.columns
     enough = NEARLY if quickly else ENOUGH
-    return _descended(problem, alone, firm, z, enough, near, quickly)
+    return _descended(problem, alone, firm, z, enough, near, known, quickly)
 
 
 def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFit, int]:
@@ -216,7 +216,8 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
             break
         total += int(lost.sum())
         problem = replace(problem, sessions=without_units(problem.sessions, lost))
-        found = _descended(problem, problem, problem, found.z, near=found.columns[~lost])
+        near = found.columns[~lost]
+        found = _descended(problem, problem, problem, found.z, near=near)
     return found, total
 
 
@@ -280,14 +281,15 @@ def _descended(
     z: Array,
     enough: float = ENOUGH,
     near: Array | None = None,
+    known: Mask | None = None,
     kept: bool = False,
 ) -> BaseFit:
     """Return where Gauss-Newton steps lead from `z`.
 
-    Columns of the base cost by far the most and hardly change about a fit: those of `near`
-    (u, 6, p), where there is one, serve until they lead no further.  The end is after a step with
-    all columns of the very point where it began that gains next to nothing; where these are `kept`,
-    it is where they lead no further.
+    Columns cost by far the most and hardly change about a fit: those of `near` (u, 6, p), where
+    there is one, serve until they lead no further; all of them, or the `known` ones (p,).  The end
+    is after a step with all columns of the very point where it began that gains next to nothing;
+    where these are `kept`, it is where they lead no further.
     """
     lower, upper = problem.bounds
     weights = problem.weights
@@ -295,7 +297,7 @@ def _descended(
     scale, columns = 0.0, near
     for _ in range(MOST_STEPS):
         fresh = columns is None
-        columns = _columns(problem, firm, z, columns, len(bare.free))
+        columns = _columns(problem, firm, z, columns, known)
         left = problem.whiten(residual)
         found = _robust_variance(left)
         scale = max(found, COOLING * scale)
@@ -321,24 +323,30 @@ def _descended(
 
 
 def _columns(
-    problem: FitProblem, firm: FitProblem, z: Array, near: Array | None = None, usual: int = 0
+    problem: FitProblem,
+    firm: FitProblem,
+    z: Array,
+    near: Array | None = None,
+    known: Mask | None = None,
 ) -> Array:
     """Return the columns of one problem, and of what another has on top of it, (u, 6, p).
 
     Play would be solved again for each column of the base.
 
     `problem`, `firm`: the whole, and the one beside which columns of its own unknowns are taken;
-    `z` (p,): where; `near` (u, 6, p): columns of a point near by: those of the first `usual` free
-    effects are taken from there; `usual`: how many.
+    `z` (p,): where; `near` (u, 6, p): columns of a point near by; `known` (p,): which of them
+    serve, by default all.
     """
-    of_firm = [n for n, u in enumerate(problem.unknowns) if u.free < len(firm.free)]
-    beyond = [n for n in range(len(z)) if n not in set(of_firm)]
     columns = np.zeros((*problem.table.values.shape, len(z))) if near is None else near.copy()
-    asked = tuple(i for i, u in enumerate(firm.unknowns) if near is None or u.free >= usual)
-    for of, own, places in ((firm, of_firm, asked), (problem, range(len(z)), tuple(beyond))):
-        if places:
-            at = [own[place] for place in places]
-            columns[:, :, at] = of.columns_at(z[own], places if len(places) < len(own) else None)
+    wanted = np.full(len(z), near is None)
+    if near is not None and known is not None:
+        wanted = ~known
+    in_firm = np.array([each.free < len(firm.free) for each in problem.unknowns], dtype=bool)
+    for of, own in ((firm, np.flatnonzero(in_firm)), (problem, np.arange(len(z)))):
+        here = wanted[own] if of is firm else wanted & ~in_firm
+        if here.any():
+            places = None if here.all() else tuple(np.flatnonzero(here).tolist())
+            columns[:, :, own[here]] = of.columns_at(z[own], places)
     return columns
 
 
@@ -362,23 +370,34 @@ def _start(problem: FitProblem, start: BaseFit | None, added: Mapping[str, Effec
     known: dict[tuple[str, str, int | None, bool], float] = {}
     if start is not None:
         known = {
-            (u.effect.name, u.key, u.session, bool(of_base)): u.mean + z * u.step
-            for u, z, of_base in zip(start.problem.unknowns, start.z, start.of_base, strict=True)
+            _key(u, len(start.bare.free)): u.mean + z * u.step
+            for u, z in zip(start.problem.unknowns, start.z, strict=True)
         }
     found = []
     for u in problem.unknowns:
-        name, of_base = u.effect.name, u.free < usual
-        at = u.mean if of_base else added[name].estimates[u.key].value
-        found.append((known.get((name, u.key, u.session, of_base), at) - u.mean) / u.step)
+        own = _key(u, usual)
+        at = u.mean if u.free < usual else added[u.effect.name].estimates[u.key].value
+        found.append((known.get(own, at) - u.mean) / u.step)
     return np.array(found)
 
 
-def _near(problem: FitProblem, start: BaseFit, usual: int) -> Array:
-    """Return the columns of the base where another fit ended, (u, 6, p); those of effects as 0."""
-    own = np.array([unknown.free < usual for unknown in problem.unknowns], dtype=bool)
-    columns = np.zeros((*problem.table.values.shape, len(own)))
-    columns[:, :, own] = start.columns[:, :, start.of_base]
-    return columns
+def _near(problem: FitProblem, start: BaseFit) -> tuple[Array, Mask]:
+    """Return the columns where another fit ended, (u, 6, p), and which unknowns it had, (p,)."""
+    columns = np.zeros((*problem.table.values.shape, len(problem.unknowns)))
+    known = np.zeros(len(problem.unknowns), dtype=bool)
+    usual = len(start.bare.free)
+    had = {_key(u, usual): (place, u.step) for place, u in enumerate(start.problem.unknowns)}
+    for place, unknown in enumerate(problem.unknowns):
+        if (key := _key(unknown, usual)) in had:
+            at, step = had[key]
+            columns[:, :, place] = start.columns[:, :, at] * (unknown.step / step)
+            known[place] = True
+    return columns, known
+
+
+def _key(unknown: Unknown, usual: int) -> tuple[str, str, int | None, bool]:
+    """Return what an unknown is called in all fits beside the same base of `usual` effects."""
+    return unknown.effect.name, unknown.key, unknown.session, unknown.free < usual
 
 
 def _robust_variance(white: Array) -> float:

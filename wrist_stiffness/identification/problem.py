@@ -237,10 +237,8 @@ class FitProblem:
     def columns(self, z: Array, places: Collection[int] | None = None) -> Array:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
-        By one-sided differences, away from the nearer bound.  Where the parameter's effect does not
-        need the path, the difference is taken at mean moments, beside what effects with a past did
-        there: that is far quicker, and good enough for the slope.  Play is solved: where a pin is
-        free, nothing else has the slope that it has without.
+        By one-sided differences, away from the nearer bound.  Effects with a past do beside another
+        parameter what they do beside this one: so only their own columns follow the path anew.
 
         `z` (p,): steps from the prior means; `places`: which unknowns are asked for; all by
         default.
@@ -259,8 +257,8 @@ class FitProblem:
         """Return the change by a step of some unknowns of what twists (t, u, 6) are shown as."""
         blocks = []
         for number, session in enumerate(self.sessions):
-            path, twists, moved, step = self._trials(number, z, asked)
-            first, *others = shown(session, np.stack([path, *twists]))
+            twists, moved, step = self._trials(number, z, asked)
+            first, *others = shown(session, np.stack(twists))
             block = np.zeros((*first.shape, len(z)))
             for place, other in zip(moved, others, strict=True):
                 block[:, :, place] = np.nan_to_num((other - first) / step[place])
@@ -269,34 +267,24 @@ class FitProblem:
 
     def _trials(
         self, number: int, z: Array, asked: list[int]
-    ) -> tuple[Array, list[Array], list[int], Array]:
-        """Return a session's predicted twists (u, 6), those with a step of some unknowns, both."""
+    ) -> tuple[list[Array], list[int], Array]:
+        """Return a session's predicted twists (u, 6), and those with a step of some unknowns."""
         model = self._models[number]
         values = self._values(z, number)
         effects = self._with_values(values)
         whole = (*self.model.effects, *effects)
         held = model.held(whole)
         step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
-        moved, trials, by_path = [], [], []
+        moved, trials = [], [_as_held(whole, held)]
         for place in asked:
             unknown = self.unknowns[place]
             if unknown.session not in (None, number):
                 continue
             other = self._moved(effects, values, unknown, float(z[place] + step[place]))
             trial = (*self.model.effects, *other)
-            by_path.append(model.remembers((unknown.effect,)))
-            if not by_path[-1]:
-                trial = _as_held(trial, held)
-            trials.append(trial)
+            trials.append(trial if unknown.effect.name in held else _as_held(trial, held))
             moved.append(place)
-        path, quick, *changed = model.predicted(
-            [whole, _as_held(whole, held), *trials], [bool(held), False, *by_path]
-        )
-        twists = [
-            path + twist - (path if on_path else quick)
-            for on_path, twist in zip(by_path, changed, strict=True)
-        ]
-        return path, twists, moved, step
+        return model.along(trials), moved, step
 
     def same_as(self, other: FitProblem) -> bool:
         """Tell whether another problem asks the same, so that what is known of it may be used."""

@@ -1,14 +1,13 @@
-"""What an effect did at a block, held as it was while others change."""
+"""What an effect added to a block, held as it was while others change."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.contribution import Contribution
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import Law, Outcome, SIValues
@@ -18,31 +17,23 @@ FIELDS = [field.name for field in fields(Contribution) if field.name != "rubbing
 
 
 class HeldLaw(Law):
-    """Adds what another effect added, whatever the others do."""
+    """Adds to the samples of a block what an effect added to them.
+
+    `added`: that, chunk by chunk; what its friction may hold besides is left out.
+    """
 
     own = ()
 
-    def __init__(self, effect: Effect, added: Contribution) -> None:
+    def __init__(self, effect: Effect, added: Sequence[Contribution]) -> None:
         self.id, self.places, self.stage = effect.law.id, (effect.component,), effect.stage
-        self._added = added
+        self._added: dict[str, Any] = {}
+        for name in FIELDS:
+            parts = [getattr(each, name) for each in added]
+            if any(part is not None for part in parts):
+                self._added[name] = np.concatenate(parts)
 
     def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return what was added to these samples; the state counts those before."""
         begun = state or 0
         end = begun + len(at.block)
-        every = ((name, getattr(self._added, name)) for name in FIELDS)
-        return Contribution(**{n: v[begun:end] for n, v in every if v is not None}), end
-
-
-def held(effect: Effect, chunks: Sequence[Contribution], mean: Callable[[Array], Array]) -> Effect:
-    """Return an effect as it was in the mean over units.
-
-    `chunks`: what it added at the moments of a session, one after the other; `mean`: turns values
-    at the moments to means over the units.  What else its friction holds is left out.
-    """
-    found = {}
-    for name in FIELDS:
-        parts = [getattr(each, name) for each in chunks]
-        if any(part is not None for part in parts):
-            found[name] = mean(np.concatenate(parts))
-    return Effect(HeldLaw(effect, Contribution(**found)), effect.component)
+        return Contribution(**{name: v[begun:end] for name, v in self._added.items()}), end

@@ -15,7 +15,7 @@ from wrist_stiffness.model.batch import Recent
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate
-from wrist_stiffness.model.held import held
+from wrist_stiffness.model.held import HeldLaw
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 Effects = tuple[Effect, ...]
@@ -48,16 +48,17 @@ class SessionModel:
         return any(self._has_memory(effect) for effect in effects)
 
     def held(self, effects: Effects) -> dict[str, Effect]:
-        """Return those effects that need the path as they are in the mean over each unit."""
-        remembering = [each for each in effects if self._has_memory(each)]
+        """Return those effects that have a past, by name, doing what they do beside all others."""
+        remembering = [each for each in effects if self._has_past(each)]
         if not remembering:
             return {}
         self._batch([effects], Moments.PATH)
         chunks = self.session.known[Moments.PATH].added
-        return {
-            each.name: held(each, [chunk[each.name] for chunk in chunks], self.session.mean)
-            for each in remembering
-        }
+        found = {}
+        for each in remembering:
+            law = HeldLaw(each, [chunk[each.name] for chunk in chunks])
+            found[each.name] = Effect(law, each.component)
+        return found
 
     def _has_memory(self, effect: Effect) -> bool:
         return effect.law.many_waves or self._has_past(effect)
@@ -66,9 +67,10 @@ class SessionModel:
         """Tell whether earlier moments decide what an effect does.
 
         The law is asked with its first values: with no play there is nothing to seek, so play has
-        no past, and its slopes are taken at mean moments.  Those at all moments led to no better
-        fits, at twice the cost.
+        no past.
         """
+        if isinstance(effect.law, HeldLaw):
+            return True
         known, asked = self.session.known, (effect.law, effect.component)
         if asked not in known:
             first = self.session.block.take(slice(0, 1))
