@@ -178,8 +178,8 @@ def evaluate_beside(
 ) -> list[Evaluated]:
     """Evaluate further models over the block of one that was evaluated.
 
-    What they have in common with it is not computed again, and flange contact is solved for all
-    models with the same elastic parts together.
+    What they have in common with it is not computed again; where the compiled formulas do not
+    serve, flange contact is solved for all models with the same elastic parts together.
 
     `models`: with the same table; `memories`: what the block before left of each; `like`: the first
     model.
