@@ -1,9 +1,9 @@
 """The same kinematics, statics and contact, compiled: for streams and for blocks of samples.
 
-For one pose a NumPy call costs more than its arithmetic, and for many the operators fill memory.  `native/` holds the formulas of
-`kinematics`, `statics`, `contact` and `rigid_motion` for one pose in C; these stay their judges,
-serve where no compiler was at hand, and say why a pose cannot be served.  A block of samples is the
-same code in a loop, so live nodes and replay agree to the bit.
+For one pose a NumPy call costs more than its arithmetic, and for many the operators fill memory.
+`native/` holds the formulas of `kinematics`, `statics`, `contact` and `rigid_motion` for one pose
+in C; these stay their judges, serve where no compiler was at hand, and say why a pose cannot be
+served.  A block of samples is the same code in a loop, so live nodes and replay agree to the bit.
 """
 
 from __future__ import annotations
