@@ -96,7 +96,7 @@ def draw_mode_shapes(
     figure = new_figure(10.0, 9.0)
     # The layout does not see the names of vertical axes.
     figure.get_layout_engine().set(rect=(0.0, 0.0, 0.96, 1.0))
-    pose = Configuration.of_row(configuration.row)
+    pose = Configuration.of_row(configuration.row[0])
     for number in range(4):
         plot: Any = figure.add_subplot(2, 2, number + 1, projection="3d")
         shapes = moved_shapes(table, pose, modes.screws[0, number])
