@@ -79,7 +79,9 @@ def test_a_late_clamp_under_the_frame_is_found_and_can_be_added(model, day):
     assert isinstance(effect, Effect)
     added = extend(model, effect, [session])
     assert added.own[0].value == pytest.approx(law.value, abs=3.0 * law.sigma)
-    assert added.after.rmse(added.quantities[0]) < 0.9 * added.before.rmse(added.quantities[0])
+    # It leaves less than the fits leave of the same day without the clamp.
+    sound, (shift, _) = extend(model, effect, [day]).before, added.quantities
+    assert added.after.rmse(shift) < 0.95 * sound.rmse(shift) < added.before.rmse(shift)
     told = law.command("wrist.yaml", ["monday"], "lifted")
     assert "--direction" in told
     assert "--component frame" in told
@@ -121,7 +123,7 @@ def test_what_pulls_at_the_platform_is_a_wrench_that_the_sensor_does_not_say(mod
     assert law.form.name == "a wave of theta_1"
     assert "at load_sensor or whatever pulls at the platform" in law.sentence
     added = extend(model, law.effect("pull"), [session])
-    assert added.after.rmse(added.quantities[0]) < 0.9 * added.before.rmse(added.quantities[0])
+    assert added.after.rmse(added.quantities[0]) < 0.8 * added.before.rmse(added.quantities[0])
 
 
 def test_what_answers_to_both_speeds_is_one_law_that_can_be_added(model, day, tmp_path):
@@ -233,7 +235,7 @@ def test_a_shift_and_a_turn_together_are_one_law_that_can_be_added(model, day):
     assert direction_of(law.way.split()) == pytest.approx(law.direction[0], abs=0.01)
     assert "mdeg about" in law.sentence
     added = extend(model, law.effect("dent"), [session])
-    assert added.after.rmse(added.quantities[0]) < 0.9 * added.before.rmse(added.quantities[0])
+    assert added.after.rmse(added.quantities[0]) < 0.8 * added.before.rmse(added.quantities[0])
 
 
 def test_a_law_beside_something_that_follows_none_is_told_as_less_sure(model, day):

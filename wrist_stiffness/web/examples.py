@@ -46,11 +46,11 @@ EXAMPLES = (
     Example(
         "cannot_tell",
         "Data that cannot tell",
-        "One minute with a laser tracker: two causes would look alike in it.",
+        "Fifty seconds with a laser tracker: two causes look alike in them.",
         "link_stiffness@link_2:uniform",
         0.5,
         days=1,
-        seconds=60.0,
+        seconds=50.0,
         instrument="tracker",
     ),
 )
