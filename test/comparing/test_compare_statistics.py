@@ -140,6 +140,19 @@ def test_what_a_calibration_could_not_take_up_is_told(model, in_the_cell):
     assert first.sizes["phi_mdeg"] > 0.7 * found.error["phi_mdeg"]
 
 
+def test_parts_are_no_more_than_the_whole(model, in_the_cell):
+    """A wrist off its drawing: laws of turns shift the platform too, by way of the new set-up."""
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=60.0, program_seed=4, base="wrong", base_seed=4
+    )
+    session = in_the_cell(model.table, settings, 4)
+    found = compare_models([("drawn", model)], [session]).models[0].explained
+    for key, error in found.error.items():
+        assert 0.0 < found.above[key] ** 2 <= error**2
+        sizes = [each.sizes[key] for each in found.told if key in each.sizes]
+        assert 0.0 < max(sizes) <= found.above[key]
+
+
 class Units:
     """What is asked of a session beside its table: the scatter of one measurement."""
 

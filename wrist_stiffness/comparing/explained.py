@@ -139,14 +139,16 @@ class Explained:
         With a misfit, which no law explains, the rest above the noise counts too.
         """
         parts, found = self.parts.values(), {}
+        # What the fit takes up of a turn shifts the platform too, so laws of both count together.
+        laws = self._rms(self._fitted(each for each in parts if each.wrong))
         rest = self._rms(np.nan_to_num(self.observations.values - self._fitted(parts)))
+        asked = {each.group.quantity for each in parts if each.wrong}
         for quantity in self.observations.reported:
             key = quantity.key
-            own = [each for each in parts if each.wrong and each.group.quantity == quantity.name]
-            square = self._rms(self._fitted(own))[key] ** 2
+            square = laws[key] ** 2 if quantity.name in asked else 0.0
             if self.answer.state.misfit:
                 square += max(rest[key] ** 2 - self.noise[key] ** 2, 0.0)
-            found[key] = float(np.sqrt(square))
+            found[key] = min(float(np.sqrt(square)), self.error[key])
         return found
 
     @cached_property
@@ -243,7 +245,7 @@ class Explained:
         own = [quantities[each.group.quantity].key for each in parts]
         every = self._rms(self._fitted(parts))
         # Parts may cancel each other; none is told as more than the whole.
-        sizes = {key: min(every[key], self.error[key]) for key in own}
+        sizes = {key: min(every[key], self.above[key]) for key in own}
         over = [sizes[key] / max(self.noise[key], 1e-12) for key in own]
         strongest = parts[int(np.argmax(over))].group
         shown = [each for each in parts if each.group.quantity == strongest.quantity]
