@@ -185,6 +185,12 @@ def test_a_signal_is_told_with_the_direction_and_a_curve_that_is_right(dwells):
     assert " um along +z." in sentences(found)[0]
 
 
+def test_a_zero_has_no_sign(dwells):
+    (told,) = table(dwells, lambda c: shift(2, 0.2e-6 * (c["humidity"] - 50.0))).told
+    turned = replace(told.curve, direction=np.array([0.8, -0.001, 0.6]))
+    assert turned.where == "along (0.80, 0.00, 0.60)"
+
+
 def test_two_signals_together_are_told_where_neither_alone_shows(dwells):
     found = table(dwells, lambda c: shift(2, 0.2e-6 * (c["humidity"] - 50.0) * c["theta_1"]))
     assert found.told[0].name == "humidity and the pose together"
@@ -263,10 +269,16 @@ def test_headroom_is_the_share_of_what_could_fall(dwells):
     assert "surely above noise and drift" in found.verdict[0]
     assert "noise and drift of the instrument, no more (" in found.verdict[2]
     assert "s falls from" in found.verdict[3]
-    assert (
-        "% of what the conditions could explain" in found.verdict[3]
-        or "all that" in found.verdict[3]
-    )
+    assert "% of what the conditions could explain" in compared(dwells, 10.0, 4.0).verdict[2]
+
+
+def test_no_more_is_claimed_where_a_model_knows_what_no_condition_shows(dwells):
+    """A model with a memory may do better than laws of the conditions, and still err."""
+    found = compared(dwells, 10.0, 0.5)
+    better = {key: 2.0 * size for key, size in found.models[1].explained.error.items()}
+    found.models[0].explained.__dict__["reachable"] = better
+    assert found.headroom(found.models[1], "s_um") > 1.0
+    assert "(laws of the conditions alone reach " in found.verdict[2]
 
 
 def test_no_headroom_is_claimed_where_nothing_could_fall(dwells):

@@ -51,6 +51,7 @@ def test_a_fault_on_no_list_is_told_as_such_and_the_error_falls_by_the_proposed_
     place = "proposed", law["component"], direction_of(law["direction"].split())
     candidate = FormulaEffect(*place, law["formula"], {})
     seen, left = bench.look_at(candidate)["seen"], calibrated["view"][1].left
+    assert seen.check == ""
     shift = left.reported[0]
     assert rms(left.values - seen.change, shift) < 0.6 * rms(left.values, shift)
     after = added(bench, candidate)

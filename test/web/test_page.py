@@ -148,6 +148,8 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     hand = Hand(browser, url, pictures, (1920, 1080))
     hand.open("wednesday.mcap", model="wrist_1.yaml")
     hand.panel("Missing")
+    hand.page.get_by_text("An effect of your own, by formula").click()
+    hand.page.wait_for_selector("text=It may use: clamp_bar")
     hand.asks("What is missing?")
     assert "no effect in the catalogue explains it" in hand.text()
     hand.page.locator("button:has-text('Proposed'):has-text('clamp_bar')").first.click()

@@ -165,7 +165,7 @@ def study_tolerances(
     """
     tolerances = tolerances_of(limits)
     if wrists < (least := 3 * len(tolerances)):
-        raise InputError(f"{wrists} wrists: {len(tolerances)} tolerances need {least} at least")
+        raise InputError(f"{wrists} wrists are too few: {len(tolerances)} tolerances need {least}")
     firsts = range(0, wrists, WRISTS_AT_A_TIME)
     one = partial(
         wrist_sums, Path(model).absolute(), tolerances, tuple(map(float, load)), seed, wrists

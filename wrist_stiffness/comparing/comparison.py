@@ -176,12 +176,10 @@ class Comparison:
             moves = f"stays at {is_now}"
         text = f"From {first.name} to {last.name} {quantity.name} {moves} {quantity.unit}"
         share = self.headroom(last, quantity.key)
-        if share is None:
+        if share is None or share >= 1.0:
+            # Laws of the conditions of a moment know nothing of where the wrist came from.
             left = f"{self.reachable[quantity.key]:.3g} {quantity.unit}"
             return f"{text} (laws of the conditions alone reach {left})."
-        if share >= 1.0:
-            # Laws of the conditions of a moment know nothing of where the wrist came from.
-            return f"{text}: all that the conditions could explain."
         return f"{text}: {100.0 * share:.0f} % of what the conditions could explain."
 
     def as_values(self) -> dict[str, Any]:

@@ -74,7 +74,7 @@ class Curve:
             return f"at most at gauge {self.quantity.called[axis]}"
         if abs(self.direction[axis]) >= ALONG_AXIS:
             return f"{preposition} {'+' if self.direction[axis] > 0.0 else '-'}{'xyz'[axis]}"
-        return f"{preposition} ({', '.join(f'{value:.2f}' for value in self.direction)})"
+        return f"{preposition} ({', '.join(f'{value:z.2f}' for value in self.direction)})"
 
     @property
     def sentence(self) -> str:
@@ -84,7 +84,7 @@ class Curve:
             at = int(np.argmax(np.abs(self.mean)))
             weights[at] = 1.0
             one, two = self.places[at]
-            told = f"It is largest about motor angles of {one:.0f} and {two:.0f} deg"
+            told = f"It is largest about motor angles of {one:z.0f} and {two:z.0f} deg"
             return f"{told}: {self._amount(weights)} {self.where}."
         low, high = sorted((int(np.argmin(self.mean)), int(np.argmax(self.mean))))
         weights[[low, high]] = -1.0, 1.0

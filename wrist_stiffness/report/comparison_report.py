@@ -163,7 +163,7 @@ def _levels(compared: Compared) -> Table:
     ]
     for model in found.models[1:]:
         shares = [_share(found.headroom(model, q.key)) for q in found.quantities]
-        rows.append([f"{model.name}: share of what could be explained", *shares])
+        rows.append([f"{model.name}: share of what these laws explain", *shares])
     return Table("What the error is to be judged by.", head, rows)
 
 

@@ -235,7 +235,7 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     figure = _figure([bars], label, "", f"versions {len(versions)}")
     floor = noise.get(quantity.key, 0.0)
     word = {"x": floor, "y": 1.0, "yref": "paper", "yanchor": "bottom", "showarrow": False}
-    word |= {"xanchor": "left" if floor < 0.6 * top else "right"}
+    word |= {"xanchor": "left" if floor < 0.3 * top else "right"}
     figure["layout"] |= {
         "showlegend": False,
         "shapes": [_upright(floor, {"color": FLOOR, "width": 2, "dash": "dash"})],

@@ -189,6 +189,7 @@ class FormulaForm:
             for field in (self._name, self._formula, self._place, self._way):
                 field.classes("w-full").on_value_change(self._check)
             self._look.classes("w-full mt-1")
+        tab.listeners.append(self._check)
         self._check()
 
     def propose(self, law: dict[str, Any]) -> None:
@@ -209,6 +210,7 @@ class FormulaForm:
         return found
 
     def _check(self) -> None:
+        """Say whether what is typed can be fitted to what is opened."""
         try:
             if not str(self._formula.value or "").strip():
                 names = ", ".join([*self._tab.covariates, *sorted(SIGNALS)])
