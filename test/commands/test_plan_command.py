@@ -169,7 +169,7 @@ def test_what_no_load_can_settle_is_a_no_and_writes_nothing(tmp_path, capsys):
         ({"schema": 1}, "found.json: schema: 1 is not 2"),
         ({"findings": {}}, "found.json: findings: {} is not a list"),
         ({"noise": {"s_um": 0.0, "phi_mdeg": 1.0}}, "noise.s_um: 0.0 is not above 0"),
-        ({"noise": {"gauges_um": 1.0}}, "noise: only gauges_um was measured; experiments are"),
+        ({"noise": {"gauges_um": 1.0}}, "position and rotation, not gauges_um alone"),
         ({"noise": {"s_um": 1.0}}, "noise: only s_um was measured"),
         (
             {"findings": [{"class": [], "parameters": {}}]},

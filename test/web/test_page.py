@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from wrist_stiffness.cli.main import main
+
 pytestmark = pytest.mark.slow
 
 TUTORIAL = Path(__file__).parents[1] / "data" / "tutorial"
@@ -168,6 +170,19 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     assert before > 3.0
     assert after < 1.0
     hand.picture("7_formula_added")
+    hand.done()
+
+
+def test_only_what_was_measured_is_offered(address, browser, pictures):
+    url, folder = address
+    seen = ["--sees", "points", "--seconds", "40", "--rate", "10"]
+    assert main(["simulate", "-o", str(folder / "points.mcap"), *seen]) == 0
+    hand = Hand(browser, url, pictures)
+    hand.open("points.mcap")
+    assert "shift s [µm]" in hand.text()
+    assert "rotation φ [mdeg]" not in hand.text()
+    hand.click("z")
+    hand.page.wait_for_selector("text=When: s along z")
     hand.done()
 
 

@@ -71,7 +71,7 @@ class Curve:
         preposition = "along" if self.quantity.name == "s" else "about"
         axis = int(np.argmax(np.abs(self.direction)))
         if self.quantity.called:
-            return f"at most at gauge {self.quantity.called[axis]}"
+            return f"most at gauge {self.quantity.called[axis]}"
         if abs(self.direction[axis]) >= ALONG_AXIS:
             return f"{preposition} {'+' if self.direction[axis] > 0.0 else '-'}{'xyz'[axis]}"
         return f"{preposition} ({', '.join(f'{value:z.2f}' for value in self.direction)})"

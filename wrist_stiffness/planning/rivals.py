@@ -48,8 +48,8 @@ def dwell_noise(table: Table, floor: Mapping[str, float]) -> MeasurementNoise:
     """
     if not {"s_um", "phi_mdeg"} <= floor.keys():
         raise InputError(
-            f"noise: only {', '.join(floor)} was measured; experiments are planned for an "
-            "instrument that measures position and rotation"
+            "experiments are planned for an instrument that measures position and rotation, "
+            f"not {' and '.join(floor)} alone"
         )
     step, mechanism = table.geometry.limits.encoder_step, table.mechanism
     jacobian = mechanism.jacobian(mechanism.forward(np.zeros(2)))

@@ -149,12 +149,6 @@ class Bench:
         self._tell("reading")
         loaded = load_model(model)
         sessions = read_sessions(Recordings(paths, {}), [loaded], self._progress)
-        for path, session in sessions.items():
-            if session.readings is not None:
-                raise InputError(
-                    f"{path.name}: readings of gauges; the pictures of this page need whole poses. "
-                    "The commands compare, calibrate and diagnose take them"
-                )
         self._tell("finding where the instrument stands")
         told, again = (self._progress, self._tell), was_fitted_to(loaded, sessions)
         self._analysis = Analysis(loaded, list(sessions.values()), *told, again)

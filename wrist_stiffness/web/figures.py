@@ -21,6 +21,7 @@ Figure = dict[str, Any]
 
 BLUE, RED, GREEN = COLOURS[:3]
 AXES = ("x", "y", "z")
+WORDS = {"s": "shift s", "phi": "rotation φ"}
 DRAWN = 3000
 """Points from which a picture is drawn by the graphics card: an hour of motion at half a second."""
 
@@ -80,12 +81,14 @@ class Shown:
         return f"{sizes} {spelled(quantity.unit)}"
 
     def part(self, values: Array) -> Array:
-        """Return the component that is shown of (u, 6) values, in the unit of the quantity."""
+        """Return the component that is shown of (u, m) values, in the unit of the quantity."""
         return np.asarray(values[:, self.quantity.components[self.axis]] * self.quantity.per_si)
 
     @property
     def part_label(self) -> str:
         """Of an axis of a picture."""
+        if self.quantity.called:
+            return f"gauge {self.quantity.called[self.axis]} [{self.unit}]"
         word = "along" if self.quantity.name == "s" else "about"
         return f"{spelled(self.quantity.name)} {word} {AXES[self.axis]} [{self.unit}]"
 
@@ -95,22 +98,29 @@ def spelled(text: str) -> str:
     return re.sub(r"\bphi\b", "φ", typeset(text))
 
 
+def quantity_label(quantity: Quantity) -> str:
+    """Return what a quantity is called where it is chosen."""
+    return f"{WORDS.get(quantity.name, quantity.name)} [{spelled(quantity.unit)}]"
+
+
 def length(values: Array, quantity: Quantity) -> Array:
-    """Return the length of a quantity of (u, 6) values, (u,) in its unit."""
-    return (
-        np.asarray(np.linalg.norm(values[:, list(quantity.components)], axis=1)) * quantity.per_si
-    )
+    """Return the length of a quantity of (u, m) values, (u,) in its unit; NaN where unmeasured."""
+    own = values[:, list(quantity.components)] * quantity.per_si
+    size = np.sqrt(np.nansum(own**2, axis=1))
+    return np.where(np.isfinite(own).any(axis=1), size, np.nan)
 
 
 def rms(values: Array, quantity: Quantity, chosen: Mask | None = None) -> float:
     """Return the root mean square of a quantity over the chosen units, or all."""
-    sizes = length(values if chosen is None else values[chosen], quantity)
-    return float(np.sqrt(np.nanmean(sizes**2))) if np.isfinite(sizes).any() else float("nan")
+    own = (values if chosen is None else values[chosen])[:, list(quantity.components)]
+    count = np.isfinite(own).sum(axis=0)
+    mean = np.nansum(own**2, axis=0) / np.maximum(count, 1)
+    return float(np.sqrt(mean.sum())) * quantity.per_si if count.any() else float("nan")
 
 
 def strongest(values: Array, quantity: Quantity) -> int:
-    """Return the component of a quantity along which (u, 6) values are largest."""
-    return int(np.argmax(np.nanmean(values[:, list(quantity.components)] ** 2, axis=0)))
+    """Return the component of a quantity along which (u, m) values are largest."""
+    return int(np.argmax(np.nansum(values[:, list(quantity.components)] ** 2, axis=0)))
 
 
 def minutes(table: Observations) -> Array:

@@ -18,6 +18,7 @@ from wrist_stiffness.web.figures import (
     contrast,
     error_map,
     minutes,
+    quantity_label,
     spelled,
     time_line,
     waterfall,
@@ -40,15 +41,14 @@ class Views:
         row, panel, equal = "w-full no-wrap gap-2 items-stretch", "panel gap-0", "flex: 1 1 0"
         with ui.row().classes(row):
             with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
-                self._numbers = ui.row().classes("gap-x-6 gap-y-0 items-end no-wrap")
+                self._numbers = ui.row().classes("gap-x-4 gap-y-0 items-end no-wrap")
             with ui.column().classes("panel gap-1 justify-center"):
-                quantity = ui.toggle({0: "shift s [µm]", 1: "rotation φ [mdeg]"})
-                quantity.props("dense").bind_value(tab, "quantity").on_value_change(self.draw)
+                self._quantity = ui.toggle([]).props("dense")
+                self._quantity.on_value_change(self._quantity_chosen)
                 with ui.row().classes("items-center gap-2 no-wrap"):
-                    ui.label("along").classes("text-xs")
-                    axes = {-1: "strongest", **dict(enumerate(AXES))}
-                    axis = ui.toggle(axes, value=-1, on_change=self._axis_chosen)
-                    axis.props("dense aria-label=along")
+                    self._along = ui.label("along").classes("text-xs whitespace-nowrap")
+                    self._axis = ui.toggle([], on_change=self._axis_chosen)
+                    self._axis.props("dense aria-label=along")
                     self._all = ui.button("Show all", on_click=lambda: tab.choose(None))
                     self._all.props("dense flat")
         height = "height: calc((100vh - 156px) * "
@@ -99,8 +99,12 @@ class Views:
 
     def draw(self) -> None:
         """Draw all pictures anew."""
-        tab, shown = self._tab, self._tab.shown
-        if shown is None or tab.table is None:
+        tab = self._tab
+        if tab.table is None:
+            return
+        self._offer()
+        shown = tab.shown
+        if shown is None:
             return
         self._tell_numbers(shown)
         self._all.set_enabled(tab.chosen is not None)
@@ -117,6 +121,22 @@ class Views:
             self._condition.set_options(ordered, value=next(iter(ordered)))
         self._draw_lower()
         self._draw_wrist()
+
+    def _offer(self) -> None:
+        """Offer what was measured, and its parts."""
+        tab = self._tab
+        measured = {place: quantity_label(each) for place, each in enumerate(tab.quantities)}
+        gauges = tab.quantities[tab.quantity].called
+        self._along.text, parts = ("at gauge", gauges) if gauges else ("along", AXES)
+        axes = {-1: "strongest", **dict(enumerate(parts))}
+        if self._axis.options != axes:
+            tab.axis = None
+        for toggle, options, value in (
+            (self._quantity, measured, tab.quantity),
+            (self._axis, axes, -1 if tab.axis is None else tab.axis),
+        ):
+            if (toggle.options, toggle.value) != (options, value):
+                toggle.set_options(options, value=value)
 
     def _tell_numbers(self, shown: Shown) -> None:
         """Write the held-out error largest; it is what a version is judged by."""
@@ -162,8 +182,10 @@ class Views:
         theta = np.array([told["theta_1"][at], told["theta_2"][at]])
         load = np.array([told[name][at] for name in ("fx", "fy", "fz", "mx", "my", "mz")])
         asked = float(self._factor.value or 0.0) or None
+        # What gauges read is no pose.
+        seen = np.full(6, np.nan) if shown.quantity.called else shown.view.measured[at]
         try:
-            drawn, factor = wrist_figure(tab.table, theta, load, shown.view.measured[at], asked)
+            drawn, factor = wrist_figure(tab.table, theta, load, seen, asked)
         except WristError as reason:
             self._wrist_title.text = f"The wrist: {reason}"
             return
@@ -175,9 +197,16 @@ class Views:
             self._factor.set_options({0: f"× {factor:g} (automatic)", **usual})
         _show(self._wrist, drawn)
 
+    def _quantity_chosen(self, event: events.ValueChangeEventArguments) -> None:
+        if event.value not in (None, self._tab.quantity):
+            self._tab.quantity = int(event.value)
+            self.draw()
+
     def _axis_chosen(self, event: events.ValueChangeEventArguments) -> None:
-        self._tab.axis = None if event.value < 0 else int(event.value)
-        self.draw()
+        axis = None if event.value in (None, -1) else int(event.value)
+        if axis != self._tab.axis:
+            self._tab.axis = axis
+            self.draw()
 
     def _selected(self, event: events.GenericEventArguments) -> None:
         shown = self._tab.shown

@@ -14,8 +14,8 @@ from wrist_stiffness.report.pictures.bent_wrist import Shape, bent_shapes, round
 from wrist_stiffness.web.figures import MAP, RED, Figure
 
 MM = 1e3
-SEEN_M = 0.008
-"""How far the largest displacement is drawn where nobody says otherwise."""
+SEEN_M, LEAST_M = 0.008, 1e-6
+"""How far the largest displacement is drawn where nobody says otherwise, if it is not less."""
 
 BENT, MEASURED = "platform under the load", "platform measured"
 EYE = np.array([1.0, 0.75, 0.85])
@@ -45,7 +45,7 @@ def wrist_figure(
     error = np.nan_to_num(measured)
     moved.append(np.linalg.norm(error[:3]) + reach * np.linalg.norm(error[3:]))
     if exaggeration is None:
-        exaggeration = round_down(SEEN_M / max(float(max(moved)), 1e-9))
+        exaggeration = round_down(SEEN_M / max(float(max(moved)), LEAST_M))
     bent = [shape.points + exaggeration * shape.shift for shape in shapes]
     told = [
         f"{name.replace('_', ' ')}: {part:.0f} %" for name, part in zip(ELASTIC, share, strict=True)
