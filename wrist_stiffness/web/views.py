@@ -41,7 +41,7 @@ class Views:
         row, panel, equal = "w-full no-wrap gap-2 items-stretch", "panel gap-0", "flex: 1 1 0"
         with ui.row().classes(row):
             with ui.column().classes(panel).style(f"{equal}; min-width: 0"):
-                self._numbers = ui.row().classes("gap-x-4 gap-y-0 items-end no-wrap")
+                self._numbers = ui.row().classes("gap-x-3 gap-y-0 items-end no-wrap")
             with ui.column().classes("panel gap-1 justify-center"):
                 self._quantity = ui.toggle([]).props("dense")
                 self._quantity.on_value_change(self._quantity_chosen)
@@ -127,7 +127,7 @@ class Views:
         tab = self._tab
         measured = {place: quantity_label(each) for place, each in enumerate(tab.quantities)}
         gauges = tab.quantities[tab.quantity].called
-        self._along.text, parts = ("at gauge", gauges) if gauges else ("along", AXES)
+        self._along.text, parts = ("gauge", gauges) if gauges else ("along", AXES)
         axes = {-1: "strongest", **dict(enumerate(parts))}
         if self._axis.options != axes:
             tab.axis = None
