@@ -77,8 +77,12 @@ def test_the_error_falls_to_the_noise_with_the_right_model(compared):
         "with_backlash: surely above noise and drift",
         "with_backlash: instrument noise",
         "palmieri2015_model: laws of the conditions, unseen part",
+        "with_backlash: share of what these laws explain",
     ):
         assert f"\n  {row} " in printed
+    shares = values["models"][1]["explained_headroom"].values()
+    for share in shares:
+        assert share is None or f"{100.0 * share:.0f} %" in printed
 
 
 def test_a_cut_recording_is_told_beside_the_verdict(tmp_path, capsys):

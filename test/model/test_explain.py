@@ -88,13 +88,17 @@ def test_uncertain_parameters_widen_the_prediction(model, make):
     assert np.allclose(unsure.covariance - sure.covariance, added, rtol=1e-6, atol=1e-16)
 
 
+def pose_off_by(rest, loaded):
+    """Return the pose that is a twist away from the predicted one, as an instrument tells it."""
+    rotation, shift = exp_twist(loaded.predict(POSE, LOAD).twist + rest)
+    turned = rotation @ loaded.table.mechanism.forward(POSE).platform
+    return [*shift, *Rotation.from_matrix(turned).as_quat()]
+
+
 def test_rows_add_up_to_s_and_phi_and_name_the_rest(model_path, loaded):
     predicted = loaded.predict(POSE, LOAD).twist
     rest = np.array([5e-6, 0.0, -2e-6, 1e-5, 0.0, 0.0])
-    rotation, shift = exp_twist(predicted + rest)
-    turned = rotation @ loaded.table.mechanism.forward(POSE).platform
-    pose = [*shift, *Rotation.from_matrix(turned).as_quat()]
-    found = explain(model_path, POSE.tolist(), LOAD, measured=pose)
+    found = explain(model_path, POSE.tolist(), LOAD, measured=pose_off_by(rest, loaded))
     assert found.measured
     # The row tells the part along the measured shift, the verdict the whole length.
     measured = (predicted + rest)[:3]
@@ -121,14 +125,19 @@ def test_a_rest_within_the_uncertainty_is_no_reason_to_search(model_path, loaded
     verdicts = []
     for sigmas in (1.9, 2.1):
         moved = np.concatenate([sigmas * np.sqrt(size[2]) * direction[:, 2], np.zeros(3)])
-        rotation, shift = exp_twist(prediction.twist + moved)
-        turned = rotation @ loaded.table.mechanism.forward(POSE).platform
-        pose = [*shift, *Rotation.from_matrix(turned).as_quat()]
+        pose = pose_off_by(moved, loaded)
         verdicts.append(explain(model_path, POSE.tolist(), LOAD, measured=pose).verdict)
     assert "no more than the uncertainty" in verdicts[0]
     assert "2.1 x and 0 x the uncertainty of the prediction: " in verdicts[1]
     assert "an effect is missing" in verdicts[1]
     assert explain(model_path, POSE.tolist(), LOAD).verdict == ""
+
+
+def test_an_instrument_that_is_not_registered_is_told_in_plain_numbers(model_path, loaded):
+    pose = pose_off_by(np.array([1.2e-3, 0.0, 0.0, 0.0, 0.0, 0.0]), loaded)
+    told = explain(model_path, POSE.tolist(), LOAD, measured=pose).verdict
+    assert "1200 um" in told
+    assert "e+" not in told
 
 
 def test_where_the_sensor_stands_is_no_reason_why_the_platform_is_off(loaded, make, tmp_path):

@@ -226,17 +226,22 @@ def _verdict(rest: Array, covariance: Array) -> str:
     ratio = np.divide(sizes, sigma, out=np.where(sizes > 0.0, np.inf, 0.0), where=sigma > 0.0)
     # Whole lengths: the rows count along what was measured, and a rest may stand across it.
     left = (
-        f"in all, whatever the direction, {MICROMETRES * sizes[0]:.3g} um and "
-        f"{MILLIDEGREES * sizes[1]:.3g} mdeg are not explained"
+        f"in all, whatever the direction, {_plain(MICROMETRES * sizes[0], 3)} um and "
+        f"{_plain(MILLIDEGREES * sizes[1], 3)} mdeg are not explained"
     )
     if ratio.max() <= WITHIN:
         return f"{left}: no more than the uncertainty of the prediction"
-    shift, turn = np.round(ratio, 2)
+    shift, turn = (_plain(float(each), 2) for each in np.round(ratio, 2))
     return (
-        f"{left}, {shift:.2g} x and {turn:.2g} x the uncertainty of the prediction: the "
+        f"{left}, {shift} x and {turn} x the uncertainty of the prediction: the "
         "measurement is off, or an effect is missing ('compare' and 'diagnose' tell from many "
         "poses)"
     )
+
+
+def _plain(value: float, digits: int) -> str:
+    """Return a size without an exponent; where it is large, with all digits before the point."""
+    return f"{value:.0f}" if value >= 10.0**digits else f"{value:.{digits}g}"
 
 
 def _directions(total: Array) -> Array:

@@ -169,9 +169,7 @@ def _levels(compared: Compared) -> Table:
 
 def _share(share: float | None) -> str:
     """Return a share of what the conditions could explain; a memory may explain more than they."""
-    if share is None:
-        return "-"
-    return "all" if share >= 1.0 else f"{100.0 * share:.0f} %"
+    return "-" if share is None else f"{100.0 * share:.0f} %"
 
 
 def _dependence(models: Sequence[ComparedModel]) -> list[Part]:
