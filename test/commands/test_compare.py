@@ -82,7 +82,7 @@ def test_the_error_falls_to_the_noise_with_the_right_model(compared):
         assert f"\n  {row} " in printed
     shares = values["models"][1]["explained_headroom"].values()
     for share in shares:
-        assert share is None or f"{100.0 * share:.0f} %" in printed
+        assert share is None or f"{100.0 * min(share, 1.0):.0f} %" in printed
 
 
 def test_a_cut_recording_is_told_beside_the_verdict(tmp_path, capsys):

@@ -108,7 +108,8 @@ def test_a_folder_that_is_missing_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("share", "text"), [(None, "-"), (0.884, "88 %"), (1.0, "all"), (2.39, "all"), (-0.2, "-20 %")]
+    ("share", "text"),
+    [(None, "-"), (0.884, "88 %"), (1.0, "100 %"), (2.39, "100 %"), (-0.2, "-20 %")],
 )
 def test_a_share_is_never_more_than_all(share, text):
     assert comparison_report._share(share) == text

@@ -169,7 +169,7 @@ def _levels(compared: Compared) -> Table:
 
 def _share(share: float | None) -> str:
     """Return a share of what the conditions could explain; a memory may explain more than they."""
-    return "-" if share is None else f"{100.0 * share:.0f} %"
+    return "-" if share is None else f"{100.0 * min(share, 1.0):.0f} %"
 
 
 def _dependence(models: Sequence[ComparedModel]) -> list[Part]:
