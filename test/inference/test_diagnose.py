@@ -229,6 +229,17 @@ def test_what_no_law_explains_is_told_of_the_quantity_that_has_it(rng):
     assert result.discrepancy["second_um"] == pytest.approx(unexplained, rel=0.1)
 
 
+def test_scatter_that_no_stated_noise_explains_is_told_of_the_quantity_that_has_it(rng):
+    each = Quantity("first", "um", (0,)), Quantity("second", "um", (1,))
+    units = table(rng, 200, quantities=each)
+    beyond = rng.normal(0.0, 8.0, 200)
+    values = units.values + beyond[:, None] * [0.0, 1.0]
+    stated = replace(units.with_values(values), covariance=np.eye(2))
+    result = diagnose(stated, (SIGN,), (ZERO,))
+    assert result.discrepancy["first_um"] < 1.0
+    assert result.discrepancy["second_um"] == pytest.approx(8.0, rel=0.1)
+
+
 def test_drift_of_the_instrument_is_not_named_and_only_where_rows_have_an_order():
     rng = np.random.default_rng(4)
     n = 120

@@ -302,16 +302,28 @@ class Evidence:
         smooth = max(float(b @ self._beyond @ b), 0.0) if on.any() else 0.0
         return smooth + self.misfit * self.point.count
 
-    def left_of(self, quantity: str, count: int) -> float:
+    def left_of(self, quantity: str, rows: NDArray[np.bool_]) -> float:
         """Return the variance of a quantity that is not explained, in units of its known noise.
 
-        `quantity`: name of a quantity of the table; `count`: measured numbers of it.
+        `quantity`: name of a quantity of the table; `rows` (N,): its measured numbers.
         """
         own = [each.quantity == quantity for each in self.background.groups]
         parts = self.energies * self.discrepant
         share = float(parts[own].sum() / parts.sum()) if parts.any() else 0.0
         smooth = self.unexplained - self.misfit * self.point.count
-        return smooth * share / count + self.misfit
+        scatter = 0.0
+        if self.misfit:
+            # There is one excess for all quantities; what is left of each says whose it is.
+            square = self._left**2
+            scatter = max(self.excess * square[rows].mean() / square.mean() - self.noise, 0.0)
+        return smooth * share / np.count_nonzero(rows) + scatter
+
+    @cached_property
+    def _left(self) -> Array:
+        """What is left of each number once everything is explained, (N,)."""
+        point, step = self.point, self._solved[2]
+        columns = [point.columns, point.inexact, self.background.columns]
+        return np.asarray(point.left + np.concatenate(columns, axis=1) @ step)
 
     @property
     def noise(self) -> float:

@@ -164,8 +164,10 @@ class Whitened:
         """Return what is left above the noise, RMS by quantity."""
         measured = self.observations.measured
         variance, own = np.broadcast_to(self.variance, measured.shape), np.zeros(measured.shape)
+        component = self._rows % self.observations.n_components
         for quantity in self.observations.quantities:
             at = list(quantity.components)
-            count = max(int(measured[:, at].sum()), 1)
-            own[:, at] = variance[:, at] * found.left_of(quantity.name, count)
+            rows = np.isin(component, at)
+            if rows.any():
+                own[:, at] = variance[:, at] * found.left_of(quantity.name, rows)
         return self.observations.rms(own)
