@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
 from wrist_stiffness.model.registry import find_law
@@ -114,6 +115,25 @@ def test_a_search_follows_the_walls(states, seed, turn, size, most):
     states.clear()
     play.resting(size * begin.reshape(1, 4))
     assert len(states) <= most
+
+
+def test_rounding_of_an_energy_whose_terms_cancel_does_not_hold_a_search_up(states):
+    """It was halved until nothing was left of the step: 1,207 states."""
+
+    def pulled(scale):
+        play = hindered(29)
+        return replace(play, force=scale * play.force)
+
+    def energy(scale):
+        play = pulled(scale)
+        return play._state(play.resting(), WALLS[-1], None)[0][0]
+
+    play = pulled(brentq(energy, 0.6, 0.7, xtol=1e-16))
+    rest, off = play.resting(), np.random.default_rng(1).normal(size=4)
+    for share in np.geomspace(1e-10, 1e-6, 65):
+        states.clear()
+        play.resting(rest + share * RADIAL * off)
+        assert len(states) <= 4
 
 
 def test_a_flange_alone_presses_a_pin_into_its_wall(states):

@@ -126,6 +126,7 @@ class Play:
                 energy, gradient, active = energy[moving], gradient[moving], active[moving]
             step = left._step(x[rows], wall, gradient, active)
             slope = np.einsum("ni,ni->n", gradient, step)
+            rounding = 1e-14 * np.abs(left.force * x[rows]).sum(axis=1)
             start, size, far = energy.copy(), np.ones(len(rows)), np.arange(len(rows))
             tried = np.empty_like(step)
             depth = np.linalg.norm(gradient.reshape(-1, 2, 2), axis=-1) / wall
@@ -134,8 +135,8 @@ class Play:
                 part = left if len(far) == len(rows) else left.take(far)
                 tried[far] = part._along(x[rows[far]], size[far, None] * step[far], depth[far])
                 energy[far], gradient[far], active[far] = part._state(tried[far], wall, active[far])
-                # Rounding of the energy is no reason to stay.
-                enough = start + ARMIJO * size * slope + 1e-14 * np.abs(start)
+                # Rounding of the energy's terms, which nearly cancel, is no reason to stay.
+                enough = start + ARMIJO * size * slope + rounding
                 far = far[energy[far] > enough[far]]
                 if len(far) == 0:
                     break
