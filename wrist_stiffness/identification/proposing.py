@@ -24,7 +24,6 @@ from wrist_stiffness.identification.law_library import (
     Beyond,
     Library,
     key_of,
-    spread,
 )
 from wrist_stiffness.identification.proposal import Proposal, Proposals
 from wrist_stiffness.identification.wrist_fit import WristFit
@@ -263,11 +262,8 @@ class _Search:
         bare = replace(bare, left=bare.left + self._table.whiten(change))
         here = replace(first.state, point=bare)
 
-        def gain(rows: Array) -> tuple[float, Array]:
-            moved = np.moveaxis(spread(rows, parts), 0, -1)
-            log, own = here.gains([-self._table.whiten(moved)])[0]
-            return log, own.reshape(z.shape)
-
+        beyond = Beyond(here, self.library.white, parts[None])
+        gain = partial(beyond.gain, 0, range(len(parts)))
         refined = self._judged(*self.library.refined(law, gain), parts, bare, first.state)
         return max(first, refined, key=_log)
 
