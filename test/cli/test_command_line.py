@@ -79,6 +79,11 @@ def test_full_disk_behind_stdout_is_one_line():
     )
 
 
+def test_a_name_that_is_too_long_is_one_line(capsys):
+    assert main(["compare", "monday.mcap", "--model", f"{300 * 'm'}.yaml"]) == 2
+    assert capsys.readouterr().err.endswith("File name too long\n")
+
+
 def test_closed_stdout_is_quiet():
     ran = subprocess.run(
         ["sh", "-c", 'exec "$0" -c "$1" >&-', sys.executable, PRINTING], stderr=subprocess.PIPE

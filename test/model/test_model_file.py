@@ -342,8 +342,10 @@ def test_a_model_without_a_file_of_its_table_cannot_be_saved(model, tmp_path):
         file_sha256(tmp_path / "none.yaml")
 
 
-def test_model_without_its_table(tmp_path):
-    (tmp_path / "m.yaml").write_text("schema: 1\nname: x\ntable: {path: no.npz}\neffects: []\n")
+@pytest.mark.parametrize("name", ["no", 300 * "n"])
+def test_model_without_its_table(tmp_path, name):
+    text = f"schema: 1\nname: x\ntable: {{path: {name}.npz}}\neffects: []\n"
+    (tmp_path / "m.yaml").write_text(text)
     with pytest.raises(TableError, match=r"m.yaml, line 3: table.path: .*relative to the model"):
         load_model(tmp_path / "m.yaml")
 

@@ -150,6 +150,8 @@ def main(
         _discard_output()
         return EXIT_PIPE_CLOSED
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            return _refuse(f"{error.filename}: {error.strerror}")
         if error.errno != errno.ENOSPC:
             raise
         # Workflows turn errors of their own files into a WristError: this one is of stdout.

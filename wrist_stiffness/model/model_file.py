@@ -117,7 +117,8 @@ def load_model(path: str | Path) -> ErrorModel:
     effects = tuple(_effect(node, path.parent) for node in values["effects"])
     entry = values["table"]
     table_file = path.parent / entry["path"]
-    if not table_file.exists():
+    # Unlike that of pathlib, it takes a name too long for one that is not there.
+    if not os.path.exists(table_file):
         raise TableError(
             f"{root['table']['path'].place}: there is no table {table_file}; the path is relative "
             "to the model file: if that was moved, write the new path"
