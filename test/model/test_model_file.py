@@ -342,6 +342,11 @@ def test_a_model_without_a_file_of_its_table_cannot_be_saved(model, tmp_path):
         file_sha256(tmp_path / "none.yaml")
 
 
+def test_a_model_file_with_a_name_that_is_too_long_is_none(tmp_path):
+    with pytest.raises(InputError, match="File name too long"):
+        load_model(tmp_path / f"{300 * 'm'}.yaml")
+
+
 @pytest.mark.parametrize("name", ["no", 300 * "n"])
 def test_model_without_its_table(tmp_path, name):
     text = f"schema: 1\nname: x\ntable: {{path: {name}.npz}}\neffects: []\n"

@@ -110,14 +110,14 @@ def load_model(path: str | Path) -> ErrorModel:
         If the table cannot be read.
     """
     path = Path(path)
-    if path.suffix == ".mcap" or (path / "metadata.yaml").is_file():
+    # Unlike those of pathlib, these take a name too long for one that is not there.
+    if path.suffix == ".mcap" or os.path.isfile(path / "metadata.yaml"):
         raise InputError(f"{path}: is a recording, not a model file")
     root = read_yaml(path, InputError)
     values = MODEL(root)
     effects = tuple(_effect(node, path.parent) for node in values["effects"])
     entry = values["table"]
     table_file = path.parent / entry["path"]
-    # Unlike that of pathlib, it takes a name too long for one that is not there.
     if not os.path.exists(table_file):
         raise TableError(
             f"{root['table']['path'].place}: there is no table {table_file}; the path is relative "
