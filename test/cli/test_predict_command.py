@@ -92,6 +92,7 @@ def test_both_evaluations_agree_within_the_stated_error(tmp_path, capsys):
         (["--angles", "inf", "0"], "not finite"),
         (["--angles", "170", "0"], "outside the table's domain"),
         (["--angles", "0", "x"], "'x'"),
+        (["--angles", "0", "0", "3.5"], "3.5 is no file; is it a number too many?"),
         (["--angles", "0"], "--angles"),
         ([], "--angles"),
         (["--angles", "0", "0", "--load", "0", "0", "-50"], "force 50 N at O, the table ends at"),

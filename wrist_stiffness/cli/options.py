@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,15 @@ if TYPE_CHECKING:
     from wrist_stiffness.compensation.settings import StreamSettings
     from wrist_stiffness.lookup.table import Table
 
-MODEL = option("model", "model file (default: the shipped wrist's)", nargs="?")
+
+def _model_file(text: str) -> str:
+    """Refuse a number that the option before did not take."""
+    if re.fullmatch(r"[-+]?[\d.,]+", text) and not Path(text).exists():
+        raise argparse.ArgumentTypeError(f"{text} is no file; is it a number too many?")
+    return text
+
+
+MODEL = option("model", "model file (default: the shipped wrist's)", nargs="?", type=_model_file)
 MODEL_OPTION = option("--model", "model file (default: the shipped wrist's)", "FILE")
 
 RECORDING = option("recording", "rosbag2 folder with MCAP storage, or a .mcap file")
