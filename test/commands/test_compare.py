@@ -179,6 +179,19 @@ def test_a_wrist_that_is_given_twice_is_no_fleet(tmp_path, capsys):
     assert said in capsys.readouterr().err
 
 
+def test_a_fleet_has_a_table_for_each_model():
+    models = [
+        {"model": name, "after_registration": {"s_um": {"rms": size}}, "depends_on": []}
+        for name, size in (("before", 4.9), ("after", 0.5))
+    ]
+    values = {"models": models, "instrument_noise": {"s_um": 0.4}, "verdict": []}
+    lines = compared_lines([Answer(Path("a"), values)])
+    assert [line.split()[:2] for line in lines] == [
+        *(["before,", "RMS"], ["recording", "s"], ["a", "4.9"], []),
+        *(["after,", "RMS"], ["recording", "s"], ["a", "0.5"]),
+    ]
+
+
 @pytest.mark.parametrize("error", ["b/c.mcap: no pose", "b/c.mcap no pose", "no pose"])
 def test_a_fleet_names_each_recording_once(error):
     rows = (Answer(Path("b/c.mcap"), None, error),)

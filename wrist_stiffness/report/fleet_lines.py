@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wrist_stiffness.comparing.wiring import LOOK_FIRST
@@ -19,10 +20,10 @@ POSE = ("s_um", "phi_mdeg")
 
 
 def compared_lines(rows: Rows) -> list[str]:
-    """Return the last model against each recording, from what `compare` gives for a program."""
+    """Return each model against each recording, from what `compare` gives for a program."""
 
-    def cells(values: Values) -> list[str]:
-        model, noise = values["models"][-1], values["instrument_noise"]
+    def cells(values: Values, place: int) -> list[str]:
+        model, noise = values["models"][place], values["instrument_noise"]
         found = []
         for key in POSE:
             size = model["after_registration"].get(key)
@@ -33,9 +34,14 @@ def compared_lines(rows: Rows) -> list[str]:
     def mistakes(values: Values) -> list[str]:
         return [sentence for sentence in values["verdict"] if sentence.startswith(LOOK_FIRST)]
 
-    models = {row.result["models"][-1]["model"] for row in rows if row.result is not None}
-    table = _table(rows, "strongest dependence", cells, "compared", mistakes)
-    return [*(f"{name}, RMS with registrations, zeros, tare refitted" for name in models), *table]
+    compared = [row.result["models"] for row in rows if row.result is not None]
+    tables = []
+    for place, model in enumerate(compared[0] if compared else [None]):
+        if model is not None:
+            tables.append(f"{model['model']}, RMS with registrations, zeros, tare refitted")
+        tables += _table(rows, "strongest dependence", partial(cells, place=place), "compared")
+        tables.append("")
+    return [*tables[:-1], *_below(rows, mistakes)]
 
 
 def diagnosed_lines(rows: Rows) -> list[str]:
@@ -53,18 +59,12 @@ def diagnosed_lines(rows: Rows) -> list[str]:
         return [each for each in [values["set_up_mistake"]] if each]
 
     title = "held-out RMS, before and after what is missing is added, and instrument noise"
-    return [title, *_table(rows, "missing", cells, "diagnosed", mistakes)]
+    return [title, *_table(rows, "missing", cells, "diagnosed"), *_below(rows, mistakes)]
 
 
-def _table(
-    rows: Rows,
-    last: str,
-    cells: Callable[[Values], list[str]],
-    done: str,
-    mistakes: Callable[[Values], list[str]],
-) -> list[str]:
-    """Return a line for each recording, and below the mistakes of the set-up."""
-    lines, below = [], []
+def _table(rows: Rows, last: str, cells: Callable[[Values], list[str]], done: str) -> list[str]:
+    """Return a line for each recording."""
+    lines = []
     for row in rows:
         if row.result is None:
             # The path stands before it already.
@@ -72,10 +72,16 @@ def _table(
             lines.append([str(row.item), "", "", "", "", f"not {done}: {why}"])
         else:
             lines.append([str(row.item), *cells(row.result)])
-            below += [f"{row.item}: {sentence}" for sentence in mistakes(row.result)]
     sizes = [title for key in POSE for title in (TITLES[key], "noise")]
     table = Table("", ["recording", *sizes, last], lines)
-    return [*table.lines(), *(["", *below] if below else [])]
+    return table.lines()
+
+
+def _below(rows: Rows, mistakes: Callable[[Values], list[str]]) -> list[str]:
+    """Return the mistakes of the set-up that recordings show."""
+    told = [(row.item, row.result) for row in rows if row.result is not None]
+    below = [f"{item}: {sentence}" for item, values in told for sentence in mistakes(values)]
+    return ["", *below] if below else []
 
 
 def _missing(values: Values) -> str:
