@@ -11,6 +11,7 @@ import argparse
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,9 @@ GAP_S = 5.0
 
 JOINT_S = 2.0
 """Between stretches in the picture."""
+
+LAW_WIDTH = 37
+"""Letters of a law in one line."""
 
 
 def draw(lines: Sequence[Line], path: Path) -> None:
@@ -78,10 +82,10 @@ def _panel(axes: Any, line: Line) -> None:
     what, unit = SHOWN[shown["unit"]]
     axes.set_ylabel(f"{what} [{unit}]", fontsize=8, labelpad=1)
     axes.tick_params(labelsize=7)
-    axes.set_title(f"{'@'.join(line['truth'])}\n", fontsize=9, loc="left")
+    text = fill(_law(line), LAW_WIDTH)
+    axes.set_title("@".join(line["truth"]) + "\n" * (1 + text.count("\n")), fontsize=9, loc="left")
     style = {"color": colour(2), "weight": "bold"} if line["right_sentence"] else {"color": FLOOR}
-    size = 6.8 if len(_law(line)) < 44 else 5.4 if len(_law(line)) < 52 else 4.6
-    law = axes.text(0.0, 1.04, _law(line), fontsize=size, transform=axes.transAxes, **style)
+    law = axes.text(0.0, 1.04, text, fontsize=6.8, transform=axes.transAxes, **style)
     law.set_in_layout(False)
 
 

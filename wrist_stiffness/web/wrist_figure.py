@@ -10,7 +10,7 @@ from wrist_stiffness.commands.budget import Push, load_alone
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, Array
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.report.pictures.bent_wrist import Shape, bent_shapes, round_down
+from wrist_stiffness.report.pictures.bent_wrist import Shape, bent_shapes, raised, round_down
 from wrist_stiffness.web.figures import MAP, RED, Figure
 
 MM = 1e3
@@ -24,6 +24,9 @@ REMOVED = ("zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraLast
 
 LEADER_PX = 18.0
 """Of the line from a part to its name."""
+
+NAME_PX, VIEW_PX = (90.0, 16.0), 220.0
+"""Width and height of a name, and of the wrist on a small screen."""
 
 
 def wrist_figure(
@@ -140,10 +143,11 @@ def _names(bodies: list[Array], told: list[str]) -> list[Figure]:
     up = np.cross(EYE, right) / np.linalg.norm(EYE)
     middles = np.array([points.mean(axis=(0, 1)) for points in bodies])
     seen = (middles - middles.mean(axis=0)) @ np.stack([right, up], axis=1)
-    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    away = seen / np.linalg.norm(seen, axis=1, keepdims=True)
     # Neighbours take turns in the length of their leaders.
-    turn = np.argsort(np.argsort(np.arctan2(seen[:, 1], seen[:, 0]))) % 2
-    leaders = LEADER_PX * (1.0 + turn[:, None]) * seen
+    turn = np.argsort(np.argsort(np.arctan2(away[:, 1], away[:, 0]))) % 2
+    leaders = LEADER_PX * (1.0 + turn[:, None]) * away
+    leaders[:, 1] += raised(VIEW_PX / np.ptp(seen) * seen + leaders, *NAME_PX)
     return [
         {
             **dict(zip("xyz", (MM * middle).tolist(), strict=True)),

@@ -130,8 +130,8 @@ def _draw_shapes(
 
     colours = ScalarMappable(Normalize(0.0, largest), "viridis")
     per_metre = largest / max(_largest(shapes), 1e-12)
-    label = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
-    for name, shape in zip((*ELASTIC, "platform"), shapes, strict=True):
+    middles = []
+    for shape in shapes:
         # The displacement decides the colour, millimetres the place.
         size = per_metre * np.linalg.norm(shape.shift, axis=-1)
         rows = size[:-1] + size[1:]
@@ -144,14 +144,38 @@ def _draw_shapes(
         plot.plot_wireframe(
             *np.moveaxis(rigid, -1, 0), color="grey", linewidth=0.3, rstride=2, cstride=3, alpha=0.5
         )
-        if named:
-            middle = bent[len(bent) // 2].mean(axis=0)
-            plot.text(*middle, name, fontsize=8, ha="center", va="center", bbox=label, zorder=1000)
+        middles.append(bent[len(bent) // 2].mean(axis=0))
     plot.set_aspect("equal")
+    if named:
+        _write_names(plot, np.array(middles))
     plot.set_xlabel("x [mm]")
     plot.set_ylabel("y [mm]")
     plot.set_zlabel("z [mm]")
     return colours
+
+
+def _write_names(plot: Any, middles: Array) -> None:
+    """Write the names of the bodies at points (9, 3), none upon another."""
+    plot.apply_aspect()
+    seen = np.column_stack([middles, np.ones(len(middles))]) @ plot.get_proj().T
+    at = seen[:, :2] / seen[:, 3:]
+    points = plot.transData.transform(at) * 72.0 / plot.figure.dpi
+    label = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
+    style = {"fontsize": 8, "ha": "center", "va": "center", "bbox": label, "zorder": 1000}
+    for name, place, up in zip((*ELASTIC, "platform"), at, raised(points, 40.0, 12.0), strict=True):
+        plot.annotate(name, place, (0.0, up), textcoords="offset points", **style)
+
+
+def raised(places: Array, width: float, height: float) -> Array:
+    """Return how far up labels of one size at (n, 2) must go so that none covers another, (n,)."""
+    free = places.copy()
+    done: list[int] = []
+    for number in np.argsort(places[:, 1]).tolist():
+        for other in sorted(done, key=lambda each: free[each, 1]):
+            if (np.abs(free[number] - free[other]) < (width, height)).all():
+                free[number, 1] = free[other, 1] + height
+        done.append(number)
+    return np.asarray(free[:, 1] - places[:, 1])
 
 
 def _shift(points: Array, screw: Array) -> Array:

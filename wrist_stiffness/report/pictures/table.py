@@ -40,7 +40,9 @@ def draw_map(table: Table, poses: Array, values: Array, label: str, load: str, p
     theta_1, theta_2 = np.degrees(poses[:, 0, 0]), np.degrees(poses[0, :, 1])
     # Even bands over the operative workspace: the steep border would take all colours else.
     levels = MaxNLocator(BANDS).tick_values(operative.min(), operative.max())
-    filled = plot.contourf(theta_1, theta_2, values.T, levels=levels, cmap="viridis", extend="both")
+    below, above = np.nanmin(values) < levels[0], np.nanmax(values) > levels[-1]
+    extend = ("neither", "max", "min", "both")[2 * below + above]
+    filled = plot.contourf(theta_1, theta_2, values.T, levels=levels, cmap="viridis", extend=extend)
     lines = plot.contour(
         theta_1, theta_2, values.T, levels=levels[::2], colors="white", linewidths=0.5
     )
