@@ -123,7 +123,7 @@ class ToleranceStudy:
     poses: int
     load: Sequence[float]  # at O in F [N, N m]
     costs: tuple[Cost, ...]  # the dearest in s first
-    # `others`, `whole`: what goes with none of them alone, and all together
+    # `others`, `whole`: what several do together that none does alone, and all together
     others: Cost
     whole: Cost
 
@@ -282,7 +282,7 @@ def _study(
         for i, tolerance in enumerate(tolerances, start=1)
     ]
     costs.sort(key=lambda cost: -cost.size["s_um"][0])
-    others = Cost("none of them alone", np.nan, sizes(rest + slopes[0] ** 2))
+    others = Cost("several acting together", np.nan, sizes(rest + slopes[0] ** 2))
     whole = Cost("all together", np.nan, sizes(total.squares / n))
     return ToleranceStudy(name, n, len(total.squares) // 6, load, tuple(costs), others, whole)
 
