@@ -176,7 +176,7 @@ class Analysis:
         self._problems: list[WristProblem] = []
         self._versions = [Version("as given", model, {})]
         error = Judge(self._problem().begin().base).of_model(model)
-        held_out = {q.key: error.rmse(q) for q in self._shown.table.reported}
+        held_out = error.rms(self._shown.table.reported)
         self._versions = [replace(self._versions[0], held_out=held_out)]
 
     @property
@@ -261,13 +261,15 @@ class Analysis:
         tell = self._watched(self._tell)
         return diagnose_sessions(self._known(), self.sessions, naming, seconds, tell)
 
-    def propose(self, naming: float = NAMING) -> Proposals:
+    def propose(self, naming: float = NAMING, seconds: float = np.inf) -> Proposals:
         """Ask for a law where no effect of the catalogue explains what the newest model leaves.
 
         Parameters
         ----------
         naming : float
             Probability from which there is a law at all.
+        seconds : float
+            Time after which no further law is judged.
 
         Returns
         -------
@@ -275,7 +277,8 @@ class Analysis:
             Each of its `terms` has a `sentence`, a `formula`, and an `effect()` for `add`.
         """
         problem = self._problem()
-        return propose(problem, problem.begin(), naming, self._watched(self._tell))
+        tell = self._watched(self._tell)
+        return propose(problem, problem.begin(), naming, tell, seconds)
 
     def preview(self, candidate: str | Effect) -> Preview:
         """Return what a candidate would explain, without adding it.
@@ -321,7 +324,7 @@ class Analysis:
         effect, watched, known = _effect(candidate), self._watched(self._progress), self._problem()
         found = extend(self._known(), effect, self.sessions, watched, known)
         step = Step("extend", "", "", {}, added=effect.name)
-        held_out = {q.key: found.after.rmse(q) for q in found.quantities}
+        held_out = found.after.rms(found.quantities)
         own = next(each for each in found.model.effects if each.name == effect.name)
         told = held_out, found.fit, own, found.warnings
         return self._became(f"+ {effect.name}", found.model, step, *told)

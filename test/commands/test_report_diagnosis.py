@@ -194,6 +194,16 @@ def test_a_mistake_is_looked_for_where_much_is_left(monkeypatch, left, asked):
     assert (len(done), told.mistake) == (asked, MISTAKE if asked else "")
 
 
+def test_what_the_judging_session_did_not_measure_has_a_dash():
+    seen = {"s_um": 11.0}
+    points = replace(RESULT, before=seen, after=seen, held_out_noise={"s_um": 0.6})
+    answer = SimpleNamespace(diagnosis=points, absorbed=(), proposals=None, strain=None)
+    lines = diagnosis_lines(Diagnosed(answer, ("monday", "tuesday"), "", (), PROVENANCE))
+    for row, size in (("calibrated model", "11"), ("instrument noise", "0.6")):
+        (line,) = [line for line in lines if line.startswith(f"  {row}")]
+        assert line.split()[-2:] == [size, "-"]
+
+
 def test_nothing_missing_is_said_first(observations):
     page = page_of(replace(RESULT, verdict="none", findings=()), observations)
     assert "Nothing is missing: what is left is noise" in page

@@ -11,6 +11,7 @@ from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.inference.search import MANY_FITS, TIME_OVER
 from wrist_stiffness.report.absorbed import absorbed_lines
 from wrist_stiffness.report.diagnosis_report import (
+    chance_of,
     class_of,
     correction_of,
     verdict_lines,
@@ -94,6 +95,21 @@ def test_a_search_that_was_stopped_does_not_say_that_nothing_explains_it(ended, 
         f"{words} before every candidate was fitted; most promising: backlash@motor_1.{advice}"
     )
     assert "depends on the pose" in rest
+
+
+def test_what_was_not_fitted_in_time_is_not_compared():
+    late = Standing("backlash@motor_1", None, 40.0, False, "not compared: the time was over")
+    assert chance_of(late) == "-"
+
+
+def test_another_session_that_is_not_explained_is_no_nothing_missing():
+    sizes = {"after": {"s_um": 11.0}, "held_out_noise": {"s_um": 0.5}}
+    held_out = replace(answer("unknown"), scope="another session", **sizes)
+    (line,) = verdict_lines(held_out)
+    assert line.startswith("The model explains what it was fitted to, but not another session")
+    assert "there s is off by 11 um, 22 times the noise. It may not be the same wrist" in line
+    explained = replace(held_out, after={"s_um": 0.6})
+    assert verdict_lines(explained)[0].startswith("An effect is missing")
 
 
 def test_the_members_of_a_class_have_their_shares():

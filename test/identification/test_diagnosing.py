@@ -152,6 +152,15 @@ def test_what_makes_another_day_worse_is_not_handed_over(model, in_the_cell, wor
 
 
 @pytest.mark.slow
+def test_another_wrist_is_not_explained_though_nothing_is_missing_in_the_first(model, in_the_cell):
+    sessions = [measured(in_the_cell, model, seed=seed, session=seed - 3) for seed in (3, 4)]
+    found = diagnose_sessions(model, sessions).diagnosis
+    assert (found.verdict, found.probability) == ("unknown", 1.0)
+    assert found.contradicted["s_um"] > 5.0
+    assert found.after["s_um"] == found.contradicted["s_um"] * found.held_out_noise["s_um"]
+
+
+@pytest.mark.slow
 def test_a_time_that_is_over_is_said(model, in_the_cell):
     session = measured(in_the_cell, model, (BACKLASH,), seconds=40.0)
     whole = diagnose_sessions(model, [session], seconds=1e-3)
@@ -162,6 +171,7 @@ def test_a_time_that_is_over_is_said(model, in_the_cell):
     backlash = next(each for each in found.standings if each.name == "backlash@motor_1")
     assert backlash in found.promising
     assert "time was over" in backlash.why_not
+    assert backlash.probability is None
 
 
 @pytest.mark.parametrize(

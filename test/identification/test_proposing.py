@@ -60,12 +60,20 @@ def test_noise_and_tolerances_are_no_law(model, day):
     assert found.lines() == []
 
 
+def test_a_time_that_is_over_before_every_law_was_judged_is_said(model, day):
+    problem = WristProblem(model, (as_units(model, day),))
+    found = propose(problem, problem.begin(), seconds=1e-3)
+    assert not found.complete
+    assert found.lines()[-1].startswith("The time was over")
+
+
 def test_a_late_clamp_under_the_frame_is_found_and_can_be_added(model, day):
     session = planted(
         model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * lag(clamp_bar, 4)", lift_um=0.8
     )
     found = proposed(model, session)
     assert found.probability > 0.99
+    assert found.complete
     (law,) = found.terms
     assert (law.form.kind, law.form.of) == ("a late follower", ("clamp_bar",))
     assert law.component == "frame"

@@ -283,4 +283,4 @@ def test_what_ended_a_search_is_told(rng, monkeypatch, seconds, fits, ended):
     search.run()
     assert search.ended == ended
     why = {each.why_not for each in standings(search, read(search))}
-    assert (f"was not fitted: {ended}" in why) == bool(ended)
+    assert (f"not compared: {ended}" in why) == bool(ended)

@@ -135,7 +135,7 @@ def mistake_beside(
     tell: Callable[[str], None] = lambda text: None,
 ) -> str:
     """Return the mistake of signs, units or names that an answer makes likely; empty for none."""
-    mistake, noise = "", answer.diagnosis.noise
+    mistake, noise = "", answer.diagnosis.noise_of_judge
     if any(size > WORTH_ASKING * noise[key] for key, size in answer.diagnosis.after.items()):
         tell("asking for wrong signs, units and names")
         mistake = told_mistake(suspicion_in(known, sessions))

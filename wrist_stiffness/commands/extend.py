@@ -135,12 +135,12 @@ class Extended:
     @property
     def before(self) -> dict[str, float]:
         """Errors on the unseen part without the effect, RMS by the key of the quantity."""
-        return {q.key: self.extension.before.rmse(q) for q in self.extension.quantities}
+        return self.extension.before.rms(self.extension.quantities)
 
     @property
     def after(self) -> dict[str, float]:
         """Errors on the unseen part with it."""
-        return {q.key: self.extension.after.rmse(q) for q in self.extension.quantities}
+        return self.extension.after.rms(self.extension.quantities)
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""

@@ -109,8 +109,8 @@ def calibrate(
     reported = first.problem.table.reported
     return Calibration(
         found,
-        {q.key: before.rmse(q) for q in reported},
-        {q.key: after.rmse(q) for q in reported},
+        before.rms(reported),
+        after.rms(reported),
         judge.by,
         calibrated,
     )

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from wrist_stiffness.identification.base_fit import BaseFit, without_units
+from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.inference.held_out import HeldOut, sealed_units
 from wrist_stiffness.mechanism.components import Array
@@ -59,6 +60,14 @@ class Judge:
             white, left = (self._white(problem, each) for each in (columns, residual))
             residual = residual + columns @ np.linalg.lstsq(white, -left, rcond=1e-9)[0]
         return self._held_out(problem, residual)
+
+    def noise(self, excess: float) -> dict[str, float]:
+        """Return the scatter of one unit of that part, RMS by quantity.
+
+        `excess`: of the noise's variance over what instrument and dwells tell.
+        """
+        scatter = likelihood_of(self.whole).scatter[self.aside]
+        return self.whole.problem.table.take(self.aside).rms(excess * scatter)
 
     def of_model(self, model: ErrorModel) -> HeldOut:
         """Return what a model leaves of that part as it stands."""

@@ -73,10 +73,10 @@ class WristTable(Whitened):
             own = own_covariance(left, left.covariance) - slow[:, :, None] ** 2 * each_its_own
             width = KNOWN
         variance: Array = np.diagonal(own, axis1=1, axis2=2)
-        self._scatter = variance
+        self.scatter: Array = variance
         if left.shared is not None and left.stand is not None:
             shared = np.sum(left.shared**2, axis=2) * (left.stand >= 0)[:, None]
-            self._scatter = variance + shared
+            self.scatter = variance + shared
         each = [np.broadcast_to(s.white, (len(s), len(s.white)))[s.measured] for s in sessions]
         single = np.nan_to_num(np.median(np.concatenate(each), axis=0))
         single = np.where(single > 0.0, single, np.sqrt(np.median(variance, axis=0)))
@@ -93,18 +93,14 @@ class WristTable(Whitened):
 
     def noise(self, found: Evidence) -> dict[str, float]:
         """Return the scatter of a unit by noise and hidden counts, RMS by quantity."""
-        return self.observations.rms(self._scatter_of(found))
+        return self.observations.rms(self.scatter * found.noise)
 
     def noise_and_drift(self, found: Evidence) -> dict[str, float]:
         """Return that with the instrument's slow drift, RMS by quantity."""
-        own = self._scatter_of(found)
+        own = self.scatter * found.noise
         at = {each.name: list(each.components) for each in self.observations.quantities}
         groups = zip(found.background.groups, found.amplitude, found.discrepant, strict=True)
         for group, size, wrong in groups:
             if group.name == SLOW_DRIFT and not wrong:
                 own[:, at[group.quantity]] += (size * self.drift[at[group.quantity]]) ** 2
         return self.observations.rms(own)
-
-    def _scatter_of(self, found: Evidence) -> Array:
-        """Variance of each unit by noise, as far as the excess is no misfit."""
-        return self._scatter * found.noise

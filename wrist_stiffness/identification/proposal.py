@@ -198,6 +198,8 @@ class Proposals:
         Probability of each component, where it is one of them.
     asked : int
         Forms times components times directions.
+    complete : bool
+        Whether all that may lead were judged before the time was over.
     """
 
     terms: tuple[Proposal, ...]
@@ -205,6 +207,7 @@ class Proposals:
     probability: float
     places: Mapping[str, float]
     asked: int
+    complete: bool = True
 
     @property
     def tells_apart(self) -> str:
@@ -254,6 +257,8 @@ class Proposals:
         if self.rivals:
             out += [f"   or ({_percent(e.probability)}) {e.sentence}" for e in self.rivals]
             out.append(f"   to tell the first two apart: {self.tells_apart}")
+        if not self.complete:
+            out.append("The time was over before every law was judged. Allow more --seconds.")
         return out
 
     def as_values(self) -> dict[str, Any]:
@@ -265,4 +270,5 @@ class Proposals:
             "components": dict(self.places),
             "tells_apart": self.tells_apart,
             "asked": self.asked,
+            "complete": self.complete,
         }

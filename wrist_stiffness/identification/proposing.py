@@ -8,6 +8,7 @@ that the fit knows, so their probabilities are on the scale of the effects that 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -71,6 +72,7 @@ def propose(
     fit: WristFit,
     naming: float = NAMING,
     tell: Callable[[str], None] = lambda text: None,
+    seconds: float = np.inf,
 ) -> Proposals:
     """Search the laws that explain what a fit leaves.
 
@@ -84,6 +86,8 @@ def propose(
         Probability from which there is a law at all.
     tell : callable, optional
         Told what is being done.
+    seconds : float, optional
+        Time after which no further law is judged.
 
     Returns
     -------
@@ -92,7 +96,7 @@ def propose(
     """
     terms: list[Proposal] = []
     first: tuple[list[_Judged], Array, Evidence] | None = None
-    search = _Search(problem, fit)
+    search = _Search(problem, fit, seconds)
     for number in range(MOST_TERMS):
         tell("asking for a law" if number == 0 else "asking for a second law beside it")
         base, found = fit.evidence, search.judged(fit)
@@ -116,12 +120,13 @@ def propose(
                 fit = problem.extended(fit, terms[-1].effect("first_law"))
             except WristError:
                 break
+    asked = search.library.count, search.in_time
     if first is None:
-        return Proposals((), (), 0.0, {}, search.library.count)
+        return Proposals((), (), 0.0, {}, *asked)
     judged, chances, base = first
     sure = float(chances.sum())
     if not terms:
-        return Proposals((), (), sure, {}, search.library.count)
+        return Proposals((), (), sure, {}, *asked)
     rivals = [
         _proposal(each, float(chance), base)
         for each, chance in zip(judged[1:], chances[1:], strict=True)
@@ -133,7 +138,7 @@ def propose(
         places[name] = places.get(name, 0.0) + chance
     kept = {name: p for name, p in places.items() if p >= MEMBER}
     ordered = dict(sorted(kept.items(), key=lambda pair: -pair[1]))
-    return Proposals(tuple(terms), tuple(rivals[:RIVALS]), sure, ordered, search.library.count)
+    return Proposals(tuple(terms), tuple(rivals[:RIVALS]), sure, ordered, *asked)
 
 
 def _log(judged: _Judged) -> float:
@@ -187,8 +192,13 @@ def _proposal(found: _Judged, chance: float, before: Evidence) -> Proposal:
 class _Search:
     """Judges the laws of a library beside fits of a wrist."""
 
-    def __init__(self, problem: WristProblem, fit: WristFit) -> None:
+    def __init__(self, problem: WristProblem, fit: WristFit, seconds: float) -> None:
+        self._end, self.in_time = time.monotonic() + seconds, True
         self._problem, self._table, self.library = problem, fit.table, Library(fit)
+
+    def _over(self) -> bool:
+        self.in_time = self.in_time and time.monotonic() <= self._end
+        return not self.in_time
 
     def _carriers(self, fit: WristFit, asked: Sequence[tuple[int, int]]) -> Array:
         """Return what typical screws do to each unit, (t, u, m), by places and axes."""
@@ -209,6 +219,8 @@ class _Search:
         beyond = Beyond(state.without_discrepancy(), self.library.white, carried)
         found = []
         for law in self.library.leaders(beyond):
+            if self._over():
+                break
             best = self.library.refined(law, partial(beyond.gain, law.place, law.free))
             parts = carried[law.place, list(law.free)]
             found.append(self._judged(*best, parts, state.point, state))
@@ -231,7 +243,7 @@ class _Search:
                 for n, more in further.items()
                 if more > NEGLIGIBLE and found[n].log + more > best - NEGLIGIBLE
             ]
-            if not worth:
+            if not worth or self._over():
                 return sorted(found, key=_log, reverse=True)
             n = max(worth, key=lambda n: found[n].log + further[n])
             again = self._fitted(found[n], near)

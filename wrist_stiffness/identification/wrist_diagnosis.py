@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.base_fit import BaseFit, fit_base, fit_cleaned
 from wrist_stiffness.identification.candidates import compensable, turns_normal
-from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.held_out import ANOTHER_SESSION, Judge
 from wrist_stiffness.identification.problem import require_units
 from wrist_stiffness.identification.proposal import Proposals
 from wrist_stiffness.identification.proposing import propose
@@ -101,7 +102,7 @@ def diagnose_sessions(
     naming : float, optional
         Probability from which an effect is named.
     seconds : float, optional
-        Time after which no further fit is begun.
+        Time after which no further fit is begun and no further law is judged.
     tell : callable, optional
         Told what is being done.
 
@@ -115,6 +116,7 @@ def diagnose_sessions(
     InputError
         If there is no session, or one without any measured pose, or a setting is out of range.
     """
+    end = time.monotonic() + seconds
     _require_poses(sessions)
     if not 0.0 < naming < 1.0:
         raise InputError(f"naming probability {naming:g} is not between 0 and 1 (0 to 100 %)")
@@ -134,7 +136,8 @@ def diagnose_sessions(
         judge.after, reading = judge.before, _settled(reading.refute(search.base))
     proposals = None
     if search.ended != TIME_OVER and (reading.verdict == "unknown" or reading.depends_on):
-        proposals = propose(problem, reading.state.fit, naming, tell)
+        left = end - time.monotonic()
+        proposals = propose(problem, reading.state.fit, naming, tell, left)
     state = reading.state
     absorbed = taken_up(state.fit.base, [session.name for session in sessions])
     findings = [_finding(search, each, reading, judge) for each in reading.named]
@@ -148,8 +151,8 @@ def diagnose_sessions(
         reading.probability,
         table.noise(state.evidence),
         table.above(state.evidence),
-        {q.key: judge.before.rmse(q) for q in reported},
-        {q.key: judge.after.rmse(q) for q in reported},
+        judge.before.rms(reported),
+        judge.after.rms(reported),
         tuple(findings),
         tuple(suspects),
         reading.depends_on,
@@ -159,10 +162,14 @@ def diagnose_sessions(
         tuple(each.sentence for each in absorbed),
         judge.scope,
         ended=search.ended,
+        held_out_noise=judge.noise(state.evidence.noise),
     )
+    if reading.verdict == "none" and diagnosis.contradicted:
+        # So much above the noise is no chance.
+        diagnosis = replace(diagnosis, verdict="unknown", probability=1.0)
     # Tolerances that give way to an unknown law, or one not asked yet, say nothing of the drawing.
-    told = bool(proposals and proposals.terms) or search.ended == TIME_OVER
-    tense = None if told else strain(state.fit)
+    asked = search.ended != TIME_OVER and (proposals is None or proposals.complete)
+    tense = strain(state.fit) if asked and not (proposals and proposals.terms) else None
     beyond = state.fit.base.beyond()
     effects = tuple(beyond[each.name] for each in reading.named)
     return WristDiagnosis(
@@ -207,6 +214,10 @@ class _Judged:
         effects = list(near.beyond().values())
         self.after = self._left(effects) if effects else self.before
 
+    def noise(self, excess: float) -> dict[str, float]:
+        """Return the noise of another session that judges; nothing where there is none."""
+        return self._judge.noise(excess) if self.scope == ANOTHER_SESSION else {}
+
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
         """Return what is left by the model with some effects."""
         judge = self._judge
@@ -229,7 +240,8 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
     buys = {}
     if judge is not None:
         before = judge.without(fit.base, found.name)
-        buys = {q.key: bought(before, judge.after, q) for q in quantities}
+        seen = judge.after.rms(quantities)
+        buys = {q.key: bought(before, judge.after, q) for q in quantities if q.key in seen}
     normal = fit.base.problem.model.table.mechanism
     theta = np.concatenate([s.still.theta[s.measured] for s in fit.base.problem.sessions])
     points = turns_normal(fit.twist(found.name)[:, :, None], normal.normal(normal.forward(theta)))

@@ -35,6 +35,10 @@ GROWS = "makes the held-out error grow"
 AS_MUCH = "explains as much, with less usual values"
 """Why something is not named that only what is usual speaks against."""
 
+CONTRADICTS = 3.0
+"""Held-out error, in times its noise, that what explains the rest does not explain: another day of
+a wrist stays below 1.3, the day of another wrist is above 7 (`simulate --base wrong`)."""
+
 DETECTABLE = 3.0
 """Standard deviations that an effect of typical size must leave beyond the rest to be seen."""
 
@@ -82,8 +86,8 @@ class Standing:
     ----------
     name : str
         `effect@component`.
-    probability : float
-        That it is missing in the model.
+    probability : float or None
+        That it is missing in the model; None where the search ended before it was fitted.
     log_gain : float
         Gain of log evidence by the best set with it over the nominal model; to first order where no
         set with it was worth a fit.
@@ -94,7 +98,7 @@ class Standing:
     """
 
     name: str
-    probability: float
+    probability: float | None
     log_gain: float
     fitted: bool
     why_not: str
@@ -286,10 +290,12 @@ def standings(search: Search, reading: Reading) -> tuple[Standing, ...]:
             why = AS_MUCH
         if name in refuted:
             why = GROWS
-        if name not in fitted and gain >= CHANCE and search.ended:
-            why = f"was not fitted: {search.ended}"
-        found.append(Standing(name, probability, gain, name in fitted, why))
-    return tuple(sorted(found, key=lambda each: (-each.probability, -each.log_gain)))
+        late = name not in fitted and gain >= CHANCE and bool(search.ended)
+        if late:
+            why = f"not compared: {search.ended}"
+        known = None if late else probability
+        found.append(Standing(name, known, gain, name in fitted, why))
+    return tuple(sorted(found, key=lambda each: (-(each.probability or 0.0), -each.log_gain)))
 
 
 def _as_good(search: Search, named: Collection[str]) -> set[str]:
@@ -413,6 +419,8 @@ class Diagnosis:
     ended : str
         What ended the search before every candidate worth a fit was fitted: "the time was over", or
         "the limit of fits was reached"; empty where nothing did.
+    held_out_noise : dict
+        Scatter of one held-out unit, as `noise`, where these are of another session.
     """
 
     verdict: Verdict
@@ -430,6 +438,23 @@ class Diagnosis:
     absorbed: tuple[str, ...] = ()
     scope: str = ""
     ended: Ended = ""
+    held_out_noise: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def noise_of_judge(self) -> Mapping[str, float]:
+        """Scatter of one of the units that judge."""
+        return self.held_out_noise or self.noise
+
+    @property
+    def contradicted(self) -> dict[str, float]:
+        """Errors on the held-out units, in times their noise, where only these are not explained.
+
+        By quantity and unit.
+        """
+        if self.unexplained:
+            return {}
+        over = {key: self.after[key] / size for key, size in self.held_out_noise.items()}
+        return {key: times for key, times in over.items() if times > CONTRADICTS}
 
     @property
     def complete(self) -> bool:
@@ -457,7 +482,9 @@ class Diagnosis:
             "ended": self.ended,
             "probability": self.probability,
             "scope": self.scope,
+            "contradicted": self.contradicted,
             "noise": dict(self.noise),
+            "held_out_noise": dict(self.held_out_noise),
             "discrepancy": dict(self.discrepancy),
             "before": {f"rms_{key}": value for key, value in self.before.items()},
             "after": {f"rms_{key}": value for key, value in self.after.items()},

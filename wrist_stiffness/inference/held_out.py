@@ -7,7 +7,7 @@ Of one session it is a part, without which what was found is fitted anew.  All o
 the effects, this part too: it judges their values, and hardly whether they are the right ones.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,6 +68,11 @@ class HeldOut:
         total = np.sum(np.where(measured, columns, 0.0) ** 2, axis=0)
         mean = total / np.maximum(measured.sum(axis=0), 1)
         return float(np.sqrt(mean.sum())) * quantity.per_si
+
+    def rms(self, quantities: Iterable[Quantity]) -> dict[str, float]:
+        """Return that of each quantity that was measured there, by its key."""
+        measured = np.flatnonzero(np.isfinite(self.residual).any(axis=0))
+        return {q.key: self.rmse(q) for q in quantities if {*q.components} & {*measured.tolist()}}
 
 
 def speak_for(

@@ -141,8 +141,8 @@ def diagnose(
         reading.probability,
         seen.rms(_noise(reading.state, table)),
         table.above(reading.state.evidence),
-        {q.key: before.rmse(q) for q in seen.reported},
-        {q.key: after.rmse(q) for q in seen.reported},
+        before.rms(seen.reported),
+        after.rms(seen.reported),
         tuple(
             _finding(each, reading.state, judge.left(reading.state.fit, each.name), after)
             for each in reading.named

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from math import nan
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent, sentences
 from wrist_stiffness.inference import Diagnosis, Finding
-from wrist_stiffness.inference.answer import NotExcited
+from wrist_stiffness.inference.answer import NotExcited, Standing
 from wrist_stiffness.inference.search import TIME_OVER
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.absorbed import absorbed_lines, absorbed_table
@@ -75,7 +76,7 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
     if result.findings:
         falls = [
             f"{_name(key)} from {number(before)} to {number(result.after[key])} {_unit(key)} "
-            f"(instrument noise {number(result.noise[key])})"
+            f"(instrument noise {number(result.noise_of_judge[key])})"
             for key, before in result.before.items()
         ]
         verdict.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
@@ -121,13 +122,14 @@ def _sections(
     rows = (
         ("calibrated model (held out)", result.before),
         *findings_in,
-        ("instrument noise, without drift", result.noise),
+        ("instrument noise, without drift", result.noise_of_judge),
         ("left above noise and drift (all data)", result.discrepancy),
     )
+    keys = {**result.noise, **result.before}
     table = Table(
         f"RMS. Held out: {result.scope}; these rows hold the instrument's drift too.",
-        ["", *(TITLES[key] for key in result.before)],
-        [[name, *(number(row[key]) for key in result.before)] for name, row in rows],
+        ["", *(TITLES[key] for key in keys)],
+        [[name, *(number(row.get(key, nan)) for key in keys)] for name, row in rows],
     )
     return {
         "Findings": findings or ["No effect of the catalogue was found."],
@@ -183,7 +185,7 @@ def _fall(result: Diagnosis) -> Picture:
             ["before", "with the findings"],
             [before, result.after[key]],
             [0.0, 0.0],
-            {"instrument noise": result.noise[key]},
+            {"instrument noise": result.noise_of_judge[key]},
         )
         for key, before in result.before.items()
     ]
@@ -196,11 +198,16 @@ def _fall(result: Diagnosis) -> Picture:
 def _ranking(result: Diagnosis) -> Table:
     """Return how the leading candidates stand."""
     rows = [
-        (each.name, percent(each.probability), f"{each.log_gain:+.0f}", each.why_not or "named")
+        (each.name, chance_of(each), f"{each.log_gain:+.0f}", each.why_not or "named")
         for each in result.standings[:MOST_RANKED]
     ]
     caption = "How the leading candidates stand; log evidence against the calibrated model."
     return Table(caption, ("effect", "probability", "log evidence", ""), rows)
+
+
+def chance_of(standing: Standing) -> str:
+    """Return the probability of a candidate; a dash where the search ended before its fit."""
+    return "-" if standing.probability is None else percent(standing.probability)
 
 
 def _depends(found: Diagnosed, left: Explained) -> list[Part]:
@@ -232,6 +239,8 @@ def verdict_lines(result: Diagnosis) -> list[str]:
     lines = [f"Missing in the model: {found}."] if found else []
     if not result.complete:
         lines.append(_unfinished(result))
+    elif result.contradicted:
+        lines.append(_contradicted(result))
     elif result.verdict == "unknown":
         if result.depends_on:
             lines.append("The error is real, but no effect in the catalogue explains it.")
@@ -245,6 +254,19 @@ def _unfinished(result: Diagnosis) -> str:
     if result.promising:
         text += f"; most promising: {', '.join(e.name for e in result.promising[:MOST_PROMISING])}"
     return f"{text}. Allow more --seconds." if result.ended == TIME_OVER else f"{text}."
+
+
+def _contradicted(result: Diagnosis) -> str:
+    errors = " and ".join(
+        f"{_name(key)} is off by {number(result.after[key])} {_unit(key)}, {over:.0f} times the "
+        "noise"
+        for key, over in result.contradicted.items()
+    )
+    return (
+        f"The model{' with it' * bool(result.findings)} explains what it was fitted to, but not "
+        f"{result.scope}: there {errors}. It may not be the same wrist, or not in the same state; "
+        "or what was fitted shows too little of it."
+    )
 
 
 def rest_lines(result: Diagnosis) -> list[str]:

@@ -88,7 +88,7 @@ def _judged_lines(
 ) -> list[str]:
     """Tell what a fit saw, its errors as a table, how they were judged, and how much is left."""
     cells = [
-        [name, *(f"{row[key]:.3f}" for key in fit.noise)]
+        [name, *(f"{row[key]:.3f}" if key in row else "-" for key in fit.noise)]
         for name, row in {**rows, "noise and drift alone": fit.noise}.items()
     ]
     table = Table("", ["", *(TITLES.get(key, key) for key in fit.noise)], cells)

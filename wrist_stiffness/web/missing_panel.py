@@ -13,7 +13,7 @@ from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.model.formula_law import FORMULA_PLACES, SIGNALS
-from wrist_stiffness.report.diagnosis_report import verdict_lines
+from wrist_stiffness.report.diagnosis_report import chance_of, verdict_lines
 from wrist_stiffness.web.bench import Seen
 from wrist_stiffness.web.figures import spelled
 from wrist_stiffness.web.tab import DEPENDS, VERSIONS, Tab
@@ -115,9 +115,9 @@ class MissingPanel:
         with button, ui.column().classes("w-full gap-0 items-start text-left px-1"):
             with ui.row().classes("w-full justify-between no-wrap"):
                 ui.label(name).classes("font-bold")
-                ui.label(percent(standing.probability))
-            if standing.probability >= 0.01:
-                ui.linear_progress(standing.probability, show_value=False).props(
+                ui.label(chance_of(standing))
+            if (chance := standing.probability or 0.0) >= 0.01:
+                ui.linear_progress(chance, show_value=False).props(
                     "color=orange-9 track-color=grey-4 aria-hidden=true"
                 )
             if alike:

@@ -59,6 +59,7 @@ class ModelsPanel:
                 sizes = ", ".join(
                     spelled(f"{q.name} {number(version.held_out[q.key])} {q.unit}")
                     for q in tab.quantities
+                    if q.key in version.held_out
                 )
                 note = " (instrument not registered)" if place == 0 else ""
                 ui.label(f"held-out error: {sizes}{note}").classes("text-xs")

@@ -145,7 +145,7 @@ class Views:
         with self._numbers:
             for quantity in tab.quantities:
                 key, unit = quantity.key, spelled(quantity.unit)
-                sizes = [each.held_out[key] for each in versions[1:] or versions]
+                sizes = [each.held_out.get(key, np.nan) for each in versions[1:] or versions]
                 path = " → ".join(number(size) for size in dict.fromkeys((sizes[0], sizes[-1])))
                 with ui.column().classes("gap-0"):
                     ui.label(f"Held-out error of {spelled(quantity.name)}").classes("text-xs")
