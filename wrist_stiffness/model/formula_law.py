@@ -69,7 +69,7 @@ class FormulaLaw(Law):
     formulas as there are directions.
     """
 
-    check = "what the formula's author has in mind"
+    check = ""
     excited_by = "a wide range of what the formula depends on"
 
     def __init__(
