@@ -170,6 +170,12 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     assert before > 3.0
     assert after < 1.0
     hand.picture("7_formula_added")
+    # What was written of one recording is gone when another is opened.
+    hand.panel("Open")
+    hand.page.get_by_text("Your own recordings").click()
+    hand.asks("Open")
+    hand.panel("Missing")
+    assert formula.input_value() == ""
     hand.done()
 
 

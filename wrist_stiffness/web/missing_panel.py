@@ -31,6 +31,7 @@ class MissingPanel:
         self._last: Seen | None = None
         self._rival, self._grams = "", 50.0
         self._drawn: tuple[object, ...] = ()
+        self._opened = tab.contents
         self._body = ui.column().classes("w-full gap-2")
         self._formula = FormulaForm(tab)
         self._list = ui.column().classes("w-full gap-2")
@@ -40,6 +41,9 @@ class MissingPanel:
     def draw(self) -> None:
         """Say anew what is missing, where it is something else."""
         tab = self._tab
+        if tab.contents is not self._opened:
+            self._opened = tab.contents
+            self._formula.clear()
         told = tab.rows, tab.version, tab.told, tab.diagnosis, tab.seen, tab.planned, self._all
         if told == self._drawn:
             return
@@ -179,27 +183,34 @@ class FormulaForm:
         self._tab = tab
         props = "dense outlined stack-label"
         with ui.expansion("An effect of your own, by formula").classes("w-full") as self._form:
-            self._name = ui.input("name", value="own_effect").props(props)
+            self._name = ui.input("name").props(props)
             self._formula = ui.input("formula", placeholder="lift_um * clamp_bar").props(props)
             places = list(FORMULA_PLACES)
-            self._place = ui.select(places, value="frame", label="at which part").props(props)
-            self._way = ui.input("direction", value="along +z").props(props)
+            self._place = ui.select(places, label="at which part").props(props)
+            self._way = ui.input("direction").props(props)
             self._said = ui.label("").classes("text-xs")
             self._look = ui.button("See what it would explain", on_click=self._looked)
-            for field in (self._name, self._formula, self._place, self._way):
+            self._fields = self._name, self._formula, self._place, self._way
+            for field in self._fields:
                 field.classes("w-full").on_value_change(self._check)
             self._look.classes("w-full mt-1")
         tab.listeners.append(self._check)
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin anew: what was written of one recording says nothing of another."""
+        self._write("own_effect", "", "frame", "along +z")
         self._check()
 
     def propose(self, law: dict[str, Any]) -> None:
         """Fill the form with a law that was proposed."""
-        self._formula.set_value(law["formula"])
-        self._place.set_value(law["component"])
-        self._way.set_value(law["direction"])
-        self._name.set_value("proposed")
+        self._write("proposed", law["formula"], law["component"], law["direction"])
         self._form.set_value(True)
         ui.run_javascript(f"getHtmlElement({self._look.id}).scrollIntoView({{block: 'nearest'}})")
+
+    def _write(self, *values: str) -> None:
+        for field, value in zip(self._fields, values, strict=True):
+            field.set_value(value)
 
     def _effect(self) -> FormulaEffect:
         """Return what is typed, read and in no case run (InputError if it is no effect)."""
