@@ -103,13 +103,14 @@ def test_what_was_not_fitted_in_time_is_not_compared():
 
 
 def test_another_session_that_is_not_explained_is_no_nothing_missing():
-    sizes = {"after": {"s_um": 11.0}, "held_out_noise": {"s_um": 0.5}}
+    sizes = {"after": {"s_um": 11.0}, "unforeseen": {"s_um": 22.0}}
     held_out = replace(answer("unknown"), scope="another session", **sizes)
-    (line,) = verdict_lines(held_out)
-    assert line.startswith("The model explains what it was fitted to, but not another session")
-    assert "there s is off by 11 um, 22 times the noise. It may not be the same wrist" in line
-    explained = replace(held_out, after={"s_um": 0.6})
-    assert verdict_lines(explained)[0].startswith("An effect is missing")
+    (line,) = verdict_lines(replace(held_out, contradicted={"s_um": 12.0}))
+    assert line.startswith("In another session s is off by 11 um, 22.0 times noise and drift")
+    assert line.endswith("it may not be the same wrist, or not in the same state.")
+    first, second = verdict_lines(replace(held_out, verdict="none"))
+    assert first.startswith("Nothing is missing")
+    assert second.endswith("Calibrate with all of them.")
 
 
 def test_the_members_of_a_class_have_their_shares():

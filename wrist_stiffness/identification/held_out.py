@@ -9,6 +9,7 @@ import numpy as np
 from wrist_stiffness.identification.base_fit import BaseFit, without_units
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.held_out import HeldOut, sealed_units
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
@@ -61,13 +62,17 @@ class Judge:
             residual = residual + columns @ np.linalg.lstsq(white, -left, rcond=1e-9)[0]
         return self._held_out(problem, residual)
 
-    def noise(self, excess: float) -> dict[str, float]:
-        """Return the scatter of one unit of that part, RMS by quantity.
+    def noise(self, found: Evidence, drift: bool = False) -> dict[str, float]:
+        """Return the scatter of one unit of that part, also by slow drift, RMS by quantity.
 
-        `excess`: of the noise's variance over what instrument and dwells tell.
+        `found`: tells how large both are.
         """
-        scatter = likelihood_of(self.whole).scatter[self.aside]
-        return self.whole.problem.table.take(self.aside).rms(excess * scatter)
+        scatter = likelihood_of(self.whole).scatter(found, drift)[self.aside]
+        return self.whole.problem.table.take(self.aside).rms(scatter)
+
+    def of_fit(self, fitted: BaseFit) -> HeldOut:
+        """Return what a fit to all sessions leaves of that part."""
+        return self._held_out(fitted.problem, fitted.residual)
 
     def of_model(self, model: ErrorModel) -> HeldOut:
         """Return what a model leaves of that part as it stands."""

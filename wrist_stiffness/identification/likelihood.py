@@ -73,10 +73,10 @@ class WristTable(Whitened):
             own = own_covariance(left, left.covariance) - slow[:, :, None] ** 2 * each_its_own
             width = KNOWN
         variance: Array = np.diagonal(own, axis1=1, axis2=2)
-        self.scatter: Array = variance
+        self._scatter = variance
         if left.shared is not None and left.stand is not None:
             shared = np.sum(left.shared**2, axis=2) * (left.stand >= 0)[:, None]
-            self.scatter = variance + shared
+            self._scatter = variance + shared
         each = [np.broadcast_to(s.white, (len(s), len(s.white)))[s.measured] for s in sessions]
         single = np.nan_to_num(np.median(np.concatenate(each), axis=0))
         single = np.where(single > 0.0, single, np.sqrt(np.median(variance, axis=0)))
@@ -93,14 +93,21 @@ class WristTable(Whitened):
 
     def noise(self, found: Evidence) -> dict[str, float]:
         """Return the scatter of a unit by noise and hidden counts, RMS by quantity."""
-        return self.observations.rms(self.scatter * found.noise)
+        return self.observations.rms(self.scatter(found))
 
     def noise_and_drift(self, found: Evidence) -> dict[str, float]:
         """Return that with the instrument's slow drift, RMS by quantity."""
-        own = self.scatter * found.noise
+        return self.observations.rms(self.scatter(found, drift=True))
+
+    def scatter(self, found: Evidence, drift: bool = False) -> Array:
+        """Return the variance of each unit by noise, and by slow drift, (u, m).
+
+        `found`: of these sessions or of others of the same instrument; it tells how large both are.
+        """
+        own = self._scatter * found.noise
         at = {each.name: list(each.components) for each in self.observations.quantities}
         groups = zip(found.background.groups, found.amplitude, found.discrepant, strict=True)
         for group, size, wrong in groups:
-            if group.name == SLOW_DRIFT and not wrong:
+            if drift and group.name == SLOW_DRIFT and not wrong:
                 own[:, at[group.quantity]] += (size * self.drift[at[group.quantity]]) ** 2
-        return self.observations.rms(own)
+        return own

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from wrist_stiffness.inference.answer import (
     read,
     standings,
 )
+from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.giving import told
 from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Observations
@@ -44,6 +45,11 @@ from wrist_stiffness.sessions.refitted import TOLERATED
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 Tell = Callable[[str], None]
+
+MUCH = 1.5
+"""Error of another session, in times noise and drift, that is neither: of one wrist a fit to both
+leaves up to 1.1, of two 2 and more (`pytest test/identification/test_diagnosing.py -k two_wrists`).
+"""
 
 
 def silent(text: str) -> None:
@@ -146,9 +152,16 @@ def diagnose_sessions(
     ]
     table = state.fit.table
     reported = table.observations.reported
+    noise = judge.noise(state.evidence, drift=True)
+    unforeseen = {} if reading.unexplained else _much(judge.after.rms(reported), noise)
+    together = judge.together(state.fit.base).rms(reported) if unforeseen else {}
+    verdict, sure = reading.verdict, reading.probability
+    if (contradicted := _much(together, noise)) and verdict == "none":
+        # So much above the noise is no chance.
+        verdict, sure = "unknown", 1.0
     diagnosis = Diagnosis(
-        reading.verdict,
-        reading.probability,
+        verdict,
+        sure,
         table.noise(state.evidence),
         table.above(state.evidence),
         judge.before.rms(reported),
@@ -162,11 +175,10 @@ def diagnose_sessions(
         tuple(each.sentence for each in absorbed),
         judge.scope,
         ended=search.ended,
-        held_out_noise=judge.noise(state.evidence.noise),
+        held_out_noise=judge.noise(state.evidence),
+        unforeseen=unforeseen,
+        contradicted=contradicted,
     )
-    if reading.verdict == "none" and diagnosis.contradicted:
-        # So much above the noise is no chance.
-        diagnosis = replace(diagnosis, verdict="unknown", probability=1.0)
     # Tolerances that give way to an unknown law, or one not asked yet, say nothing of the drawing.
     asked = search.ended != TIME_OVER and (proposals is None or proposals.complete)
     tense = strain(state.fit) if asked and not (proposals and proposals.terms) else None
@@ -214,9 +226,9 @@ class _Judged:
         effects = list(near.beyond().values())
         self.after = self._left(effects) if effects else self.before
 
-    def noise(self, excess: float) -> dict[str, float]:
+    def noise(self, found: Evidence, drift: bool = False) -> dict[str, float]:
         """Return the noise of another session that judges; nothing where there is none."""
-        return self._judge.noise(excess) if self.scope == ANOTHER_SESSION else {}
+        return self._judge.noise(found, drift) if self.scope == ANOTHER_SESSION else {}
 
     def _left(self, effects: Sequence[Effect]) -> HeldOut:
         """Return what is left by the model with some effects."""
@@ -225,10 +237,23 @@ class _Judged:
         near = self._near if effects else judge.whole
         return judge.left(fit_base(self._model, judge.seen, effects, near))
 
+    def together(self, near: BaseFit) -> HeldOut:
+        """Return what a fit to all sessions with the same effects leaves there."""
+        effects, whole = list(near.beyond().values()), self._judge.whole
+        if effects:
+            whole = fit_base(self._model, whole.problem.sessions, effects, whole)
+        return self._judge.of_fit(whole)
+
     def without(self, fitted: BaseFit, name: str) -> HeldOut:
         """Return what is left without one of the effects."""
         others = [each for own, each in fitted.beyond().items() if own != name]
         return self._left(others) if others else self.before
+
+
+def _much(errors: Mapping[str, float], noise: Mapping[str, float]) -> dict[str, float]:
+    """Return errors by quantity in times noise and drift, where they are far above them."""
+    over = {key: errors[key] / size for key, size in noise.items() if key in errors}
+    return {key: times for key, times in over.items() if times > MUCH}
 
 
 def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | None) -> Finding:

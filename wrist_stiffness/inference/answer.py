@@ -35,10 +35,6 @@ GROWS = "makes the held-out error grow"
 AS_MUCH = "explains as much, with less usual values"
 """Why something is not named that only what is usual speaks against."""
 
-CONTRADICTS = 3.0
-"""Held-out error, in times its noise, that what explains the rest does not explain: another day of
-a wrist stays below 1.3, the day of another wrist is above 7 (`simulate --base wrong`)."""
-
 DETECTABLE = 3.0
 """Standard deviations that an effect of typical size must leave beyond the rest to be seen."""
 
@@ -421,6 +417,10 @@ class Diagnosis:
         "the limit of fits was reached"; empty where nothing did.
     held_out_noise : dict
         Scatter of one held-out unit, as `noise`, where these are of another session.
+    unforeseen : dict
+        Error on these units, in times noise and drift, where what explains all others leaves much.
+    contradicted : dict
+        Likewise, what then a fit to all leaves there; empty where that explains them.
     """
 
     verdict: Verdict
@@ -439,22 +439,13 @@ class Diagnosis:
     scope: str = ""
     ended: Ended = ""
     held_out_noise: Mapping[str, float] = field(default_factory=dict)
+    unforeseen: Mapping[str, float] = field(default_factory=dict)
+    contradicted: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def noise_of_judge(self) -> Mapping[str, float]:
         """Scatter of one of the units that judge."""
         return self.held_out_noise or self.noise
-
-    @property
-    def contradicted(self) -> dict[str, float]:
-        """Errors on the held-out units, in times their noise, where only these are not explained.
-
-        By quantity and unit.
-        """
-        if self.unexplained:
-            return {}
-        over = {key: self.after[key] / size for key, size in self.held_out_noise.items()}
-        return {key: times for key, times in over.items() if times > CONTRADICTS}
 
     @property
     def complete(self) -> bool:
@@ -482,7 +473,8 @@ class Diagnosis:
             "ended": self.ended,
             "probability": self.probability,
             "scope": self.scope,
-            "contradicted": self.contradicted,
+            "unforeseen": dict(self.unforeseen),
+            "contradicted": dict(self.contradicted),
             "noise": dict(self.noise),
             "held_out_noise": dict(self.held_out_noise),
             "discrepancy": dict(self.discrepancy),

@@ -229,24 +229,23 @@ def _depends(found: Diagnosed, left: Explained) -> list[Part]:
 
 def verdict_lines(result: Diagnosis) -> list[str]:
     """Return the verdict in one or two sentences."""
+    unforeseen = [_unforeseen(result)] if result.unforeseen else []
     if result.verdict == "none":
         sure = percent(result.probability)
         decided = f"Nothing is missing: what is left is noise ({sure} sure)."
         if result.probability < 0.5:
             decided = f"Not decided: what is left may be noise ({sure}) or an effect listed below."
-        return [decided] if result.complete else [decided, _unfinished(result)]
+        return [decided, *unforeseen, *([] if result.complete else [_unfinished(result)])]
     found = "; ".join(f"{class_of(e)}, {percent(e.probability)} sure" for e in result.findings)
     lines = [f"Missing in the model: {found}."] if found else []
     if not result.complete:
         lines.append(_unfinished(result))
-    elif result.contradicted:
-        lines.append(_contradicted(result))
-    elif result.verdict == "unknown":
+    elif result.verdict == "unknown" and not result.contradicted:
         if result.depends_on:
             lines.append("The error is real, but no effect in the catalogue explains it.")
         else:
             lines.append("An effect is missing, but these recordings do not say which.")
-    return [*lines, *rest_lines(result)]
+    return [*lines, *unforeseen, *rest_lines(result)]
 
 
 def _unfinished(result: Diagnosis) -> str:
@@ -256,17 +255,19 @@ def _unfinished(result: Diagnosis) -> str:
     return f"{text}. Allow more --seconds." if result.ended == TIME_OVER else f"{text}."
 
 
-def _contradicted(result: Diagnosis) -> str:
+def _unforeseen(result: Diagnosis) -> str:
     errors = " and ".join(
-        f"{_name(key)} is off by {number(result.after[key])} {_unit(key)}, {over:.0f} times the "
-        "noise"
-        for key, over in result.contradicted.items()
+        f"{_name(key)} is off by {number(result.after[key])} {_unit(key)}, {over:.1f} times "
+        "noise and drift"
+        for key, over in result.unforeseen.items()
     )
-    return (
-        f"The model{' with it' * bool(result.findings)} explains what it was fitted to, but not "
-        f"{result.scope}: there {errors}. It may not be the same wrist, or not in the same state; "
-        "or what was fitted shows too little of it."
+    why = (
+        "No fit to all of them explains it: it may not be the same wrist, or not in the same state"
+        if result.contradicted
+        else "A fit to all of them does: the others show too little of the wrist. Calibrate with "
+        "all of them"
     )
+    return f"In {result.scope} {errors}, though the others are explained. {why}."
 
 
 def rest_lines(result: Diagnosis) -> list[str]:
