@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, product
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from wrist_stiffness.identification.forms import Form, Shape, evaluated, forms
@@ -80,15 +81,45 @@ def key_of(place: str, axis: int) -> str:
     return "size_um" if axis < 3 else "size_mdeg"
 
 
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Forms of r signals each, at all points of their grids, on the units."""
+
+    forms: list[Form]
+    first: NDArray[np.int64]  # (f,), number of the first point of each form
+    shapes: list[Shape]  # n
+    rows: Array  # (n, r, u)
+    grids: Array  # (f,), how many points each form has
+
+    @classmethod
+    def of(cls, found: Sequence[tuple[Form, Sequence[tuple[Shape, Array]]]]) -> Self:
+        """Return forms with the points that are kept of each."""
+        points = [point for _, kept in found for point in kept]
+        first = np.cumsum([0, *(len(kept) for _, kept in found[:-1])])
+        rows = np.array([rows for _, rows in points])
+        grids = np.array([len(form.shapes) for form, _ in found])
+        return cls([form for form, _ in found], first, [shape for shape, _ in points], rows, grids)
+
+    def best(
+        self, scores: tuple[Array, Array], free: Sequence[int]
+    ) -> tuple[Array, NDArray[np.int64], Array]:
+        """Return gains (f,), points (f,) and unknowns (f, r, k) of the forms at their best."""
+        (information, slope), own = scores, list(free)
+        gains, z = best_of(information[:, :, own][..., own], slope[..., own])
+        of = np.repeat(np.arange(len(self.forms)), np.diff([*self.first, len(gains)]))
+        at = np.lexsort((-gains, of))[self.first]
+        return gains[at] - PRICES[len(free)] - np.log(self.grids), at, z[at]
+
+
 class Library:
     """All laws in the recordings of a wrist."""
 
     def __init__(self, fit: WristFit) -> None:
         self._sessions = fit.base.problem.sessions
-        found = [_signals_at(fit, number) for number in range(len(self._sessions))]
+        own_signals = [_signals_at(fit, number) for number in range(len(self._sessions))]
         self._signals: list[list[dict[str, Array]]] = []
         for name in PLACES:
-            sessions = [own[name] for own in found]
+            sessions = [own[name] for own in own_signals]
             known = [key for key in sessions[0] if all(key in own for own in sessions)]
             self._signals.append([{key: own[key] for key in known} for own in sessions])
         numbers = fit.table.observations.values.size
@@ -96,18 +127,18 @@ class Library:
             np.eye(numbers).reshape(-1, fit.table.observations.n_components, numbers)
         )
         self._known: dict[str, Array | None] = {}
-        self._points: list[list[list[tuple[Form, Shape, Array]]]] = []
-        kinds = 0
+        self._points: list[list[_Points]] = []
         for place, signals in enumerate(self._signals):
-            points: dict[int, list[tuple[Form, Shape, Array]]] = {}
+            found: dict[int, list[tuple[Form, list[tuple[Shape, Array]]]]] = {}
             for form in forms(signals):
                 asked = [(shape, self._rows(form, shape, place)) for shape in form.shapes]
-                kept = [(form, shape, rows) for shape, rows in asked if rows is not None]
-                points.setdefault(len(form.each), []).extend(kept)
-                kinds += bool(kept)
-            self._points.append([own for own in points.values() if own])
-        self.price = float(np.log(OUTSIDE / max(kinds, 1)))
-        self.count = sum(len(own) for place in self._points for own in place) * len(DIRECTIONS)
+                kept = [(shape, rows) for shape, rows in asked if rows is not None]
+                if kept:
+                    found.setdefault(len(form.each), []).append((form, kept))
+            self._points.append([_Points.of(own) for own in found.values()])
+        every = [points for place in self._points for points in place]
+        self.price = float(np.log(OUTSIDE / max(sum(len(own.forms) for own in every), 1)))
+        self.count = sum(len(own.shapes) for own in every) * len(DIRECTIONS)
 
     def _rows(self, form: Form, shape: Shape, place: int) -> Array | None:
         """Return the numbers of a form (r, u), as `_row`; None if one is constant."""
@@ -133,34 +164,31 @@ class Library:
 
     def leaders(self, beyond: Beyond) -> list[Asked]:
         """Return the laws that are worth more than their first order."""
-        best: dict[tuple[str, int, int], Asked] = {}
+        asked: list[tuple[int, tuple[int, ...], _Points, Array, NDArray[np.int64], Array]] = []
         for place, every in enumerate(self._points):
-            units = [np.array([rows for _, _, rows in points]) for points in every]
-            known = [beyond.scores(rows, place, range(6)) for rows in units]
-            for (points, (information, slope)), (number, free) in product(
-                zip(every, known, strict=True), enumerate(DIRECTIONS)
-            ):
-                own = list(free)
-                gains, z = best_of(information[:, :, own][..., own], slope[..., own])
-                first = 0
-                for form, run in groupby(form for form, _, _ in points):
-                    its = slice(first, first := first + sum(1 for _ in run))
-                    n = its.start + int(np.argmax(gains[its]))
-                    gain = float(gains[n] - PRICES[len(free)] - np.log(len(form.shapes)))
-                    key = form.name, place, number
-                    if key not in best or best[key].gain < gain:
-                        best[key] = Asked(form, place, free, points[n][1], gain, z[n])
+            for points in every:
+                scores = beyond.scores(points.rows, place, range(6))
+                asked += [(place, own, points, *points.best(scores, own)) for own in DIRECTIONS]
+        whose = np.repeat(np.arange(len(asked)), [len(each[3]) for each in asked])
+        which = np.concatenate([np.arange(len(each[3])) for each in asked])
+        gains = np.concatenate([each[3] for each in asked])
         chosen: list[Asked] = []
-        seats: set[tuple[str, int]] = set()
-        for each in sorted(best.values(), key=lambda own: -own.gain):
-            here, seat = each.form.name, (each.form.name, each.place)
-            if seat not in seats and sum(form == here for form, _ in seats) == OF_ONE_FORM:
-                continue
-            if seat not in seats and len(seats) == LEADERS:
-                break
-            seats.add(seat)
-            if sum((own.form.name, own.place) == seat for own in chosen) < AT_ONE_PLACE:
-                chosen.append(each)
+        seats: dict[tuple[str, int], set[tuple[int, ...]]] = {}
+        for best in np.argsort(-gains, kind="stable").tolist():
+            place, free, points, _, at, z = asked[whose[best]]
+            n = which[best]
+            form = points.forms[n]
+            seat = form.name, place
+            if seat not in seats:
+                if sum(name == form.name for name, _ in seats) == OF_ONE_FORM:
+                    continue
+                if len(seats) == LEADERS:
+                    break
+            known = seats.setdefault(seat, set())
+            if free not in known and len(known) < AT_ONE_PLACE:
+                known.add(free)
+                shape = points.shapes[at[n]]
+                chosen.append(Asked(form, place, free, shape, float(gains[best]), z[n]))
         return chosen
 
     def refined(

@@ -494,29 +494,25 @@ def modes(information: Array, slope: Array) -> tuple[Array, Array, Array]:
     `information` (n, k, k), `slope` (n, k): of the log likelihood, where the effects are absent.
     """
     count = slope.shape[1]
+    # Along its own axes the information is a number each, whatever the prior weighs.
+    size, axes = np.linalg.eigh(information)
+    size, along = np.maximum(size, 0.0), (slope[:, None] @ axes)[:, 0]
+    least = LEAST_PRIOR * size[:, -1:]
     found = []
-    least = LEAST_PRIOR * information.diagonal(axis1=1, axis2=2).max(axis=1, initial=0.0)
-    for weight in (np.full(len(slope), 1.0), np.full(len(slope), 1e-8)):
+    for weight in (np.ones((len(slope), 1)), np.full((len(slope), 1), 1e-8)):
         for _ in range(5):
-            weight = np.maximum(weight, least)
-            whole = information + weight[:, None, None] * np.eye(count)
-            z = np.asarray(np.linalg.solve(whole, slope[..., None])[..., 0], dtype=np.float64)
-            square = _dots(z, z)
-            weight = size_weight(square, count)
-        fits = _dots(slope, z) - 0.5 * _dots((z[:, None] @ information)[:, 0], z)
+            used = np.maximum(weight, least)
+            z = along / (size + used)
+            square = np.sum(z**2, axis=1)
+            weight = size_weight(square, count)[:, None]
         prior = log_size_prior(square, count) + 0.5 * count * np.log(2.0 * np.pi)
-        found.append((fits + prior - 0.5 * np.linalg.slogdet(whole)[1], z, whole))
-    better = found[0][0] >= found[1][0]
-    gains, unknowns, precision = (
-        np.where(better.reshape(-1, *(1,) * (one.ndim - 1)), one, other)
-        for one, other in zip(*found, strict=True)
-    )
-    return gains, unknowns, precision
-
-
-def _dots(one: Array, other: Array) -> Array:
-    """Return the products of vectors (n, k) with others, (n,)."""
-    return np.asarray((one[:, None] @ other[:, :, None])[:, 0, 0])
+        fits = np.sum((along - 0.5 * size * z) * z - 0.5 * np.log(size + used), axis=1)
+        found.append((fits + prior, z, used))
+    gains = np.maximum(found[0][0], found[1][0])
+    better = (found[0][0] == gains)[:, None]
+    z, weight = (np.where(better, *pair) for pair in zip(found[0][1:], found[1][1:], strict=True))
+    unknowns = (axes @ z[..., None])[..., 0]
+    return gains, unknowns, information + weight[..., None] * np.eye(count)
 
 
 def known_noise(point: Point, background: Background) -> Evidence:
