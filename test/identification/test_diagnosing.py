@@ -196,7 +196,10 @@ def test_a_time_that_is_over_is_said(model, in_the_cell):
 
 @pytest.mark.parametrize(
     ("setting", "words"),
-    [({"naming": 90.0}, "probability 90 is not between 0 and 1"), ({"seconds": 0.0}, "0 seconds")],
+    [
+        ({"naming": 90.0}, "probability 9000 %: must be between 0 and 100 %"),
+        ({"seconds": 0.0}, "0 seconds"),
+    ],
 )
 def test_settings_that_cannot_be_are_refused(model, in_the_cell, setting, words):
     session = measured(in_the_cell, model, base="exact")

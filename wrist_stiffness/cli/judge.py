@@ -89,10 +89,12 @@ def diagnose(arguments: argparse.Namespace) -> int:
     says what to record where rivals remain.
     """
     from wrist_stiffness.commands.diagnose import diagnose_recordings
+    from wrist_stiffness.identification.wrist_diagnosis import require_limits
 
+    naming, seconds = arguments.probability / 100.0, arguments.seconds
+    require_limits(naming, seconds)
     model = model_named(arguments)
     recordings = recordings_named(arguments.recordings, arguments)
-    naming, seconds = arguments.probability / 100.0, arguments.seconds
     if _for_each(arguments):
         from wrist_stiffness.commands.fleet import each_recording, table_values
         from wrist_stiffness.report.fleet_lines import diagnosed_lines

@@ -48,8 +48,8 @@ Tell = Callable[[str], None]
 
 MUCH = 1.5
 """Error of another session, in times noise and drift, that is neither: of one wrist a fit to both
-leaves up to 1.1, of two 2 and more (`pytest test/identification/test_diagnosing.py -k two_wrists`).
-"""
+leaves up to 1.1, of two 2 and more where noise does not hide it
+(`pytest test/identification/test_diagnosing.py -k two_wrists`)."""
 
 
 def silent(text: str) -> None:
@@ -124,10 +124,7 @@ def diagnose_sessions(
     """
     end = time.monotonic() + seconds
     _require_poses(sessions)
-    if not 0.0 < naming < 1.0:
-        raise InputError(f"naming probability {naming:g} is not between 0 and 1 (0 to 100 %)")
-    if not seconds > 0.0:
-        raise InputError(f"{seconds:g} seconds for a diagnosis: must be above 0")
+    require_limits(naming, seconds)
     units = all_units(model, sessions)
     chosen = units[:-1] if len(units) > 1 else units
     problem = WristProblem(model, chosen)
@@ -201,6 +198,14 @@ def _settled(reading: Reading) -> Reading:
     """Return a reading with its set as it is handed over."""
     found = reading.state.fit.settled()
     return replace(reading, state=replace(reading.state, fit=found, evidence=found.evidence))
+
+
+def require_limits(naming: float, seconds: float) -> None:
+    """Refuse a probability from which to name, or a time, that is out of range (InputError)."""
+    if not 0.0 < naming < 1.0:
+        raise InputError(f"naming probability {100.0 * naming:g} %: must be between 0 and 100 %")
+    if not seconds > 0.0:
+        raise InputError(f"{seconds:g} seconds for a diagnosis: must be above 0")
 
 
 def _require_poses(sessions: Sequence[MeasuredSession]) -> None:
