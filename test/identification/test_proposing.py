@@ -67,6 +67,12 @@ def test_noise_and_tolerances_are_no_law(model, day):
     assert found.lines() == []
 
 
+def test_of_a_wrist_that_never_moved_no_law_is_asked(model, day):
+    still = day.take(np.arange(1))
+    found = proposed(model, still)
+    assert (found.terms, found.asked) == ((), 0)
+
+
 def test_a_time_that_is_over_before_every_law_was_judged_is_said(model, day):
     problem = WristProblem(model, (as_units(model, day),))
     found = propose(problem, problem.begin(), seconds=1e-3)

@@ -203,7 +203,7 @@ def forms(signals: Sequence[Mapping[str, Array]]) -> list[Form]:
         one, two = (pooled[name] for name in motors)
         found += [_wave("(theta_1 - theta_2)", one - two), _wave("(theta_1 + theta_2)", one + two)]
         found += [_zone(one, two), *_across(one, two)]
-    found += _of_time(pooled["time"], length)
+    found += _of_time(pooled["time"], length) if length else []
     slow = [name for name in moving if "dot" not in name and name not in TURNS]
     found += [_together(*pair, pooled) for pair in combinations((*slow, "time"), 2)]
     vectors = [(kind, [{name} for name in vector]) for kind in LINEAR for vector in VECTORS]

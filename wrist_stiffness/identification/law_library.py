@@ -169,6 +169,8 @@ class Library:
             for points in every:
                 scores = beyond.scores(points.rows, place, range(6))
                 asked += [(place, own, points, *points.best(scores, own)) for own in DIRECTIONS]
+        if not asked:
+            return []
         whose = np.repeat(np.arange(len(asked)), [len(each[3]) for each in asked])
         which = np.concatenate([np.arange(len(each[3])) for each in asked])
         gains = np.concatenate([each[3] for each in asked])
