@@ -23,7 +23,7 @@ FLOOR = {"s_um": 1.0, "phi_mdeg": 5.0}
 
 def explained(base, absorbed, findings=()):
     """Return an answer that leaves no more than noise."""
-    result = SimpleNamespace(noise=FLOOR, after=FLOOR, findings=findings)
+    result = SimpleNamespace(noise_of_judge=FLOOR, after=FLOOR, findings=findings)
     return SimpleNamespace(diagnosis=result, fitted=base, absorbed=absorbed)
 
 

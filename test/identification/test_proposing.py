@@ -1,7 +1,6 @@
 """Laws that nobody wrote are found in what a model leaves: form, component, direction and size."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -37,17 +36,11 @@ def day(model, in_the_cell):
     return replace(session, block=replace(session.block, covariates={"clamp_bar": bar}))
 
 
-@cache
-def fitted(model, session):
-    """Return the wrist of a session with its set-up and tolerances."""
-    return WristProblem(model, (as_units(model, session),)).begin().base.effects(0)
-
-
 def planted(model, session, place, direction, text, *others, **sizes):
     """The session with a law of the user's more in the wrist, and other effects."""
     law = FormulaLaw("planted", place, np.array(direction), text, ("clamp_bar",), tuple(sizes))
     # Beside the wrist as it is: a turn about a target that sits a millimetre off moves it as well.
-    wrist = fitted(model, session)
+    wrist = WristProblem(model, (as_units(model, session),)).begin().base.effects(0)
     effects = (*wrist, effect_at(law, place, sizes), *others)
     bare, grown = model.with_effects().batch_with(session.block, [wrist, effects])
     change = grown.measured - bare.measured
