@@ -106,7 +106,7 @@ def test_another_session_that_is_not_explained_is_no_nothing_missing():
     sizes = {"after": {"s_um": 11.0}, "unforeseen": {"s_um": 22.0}}
     held_out = replace(answer("unknown"), scope="another session", **sizes)
     (line,) = verdict_lines(replace(held_out, contradicted={"s_um": 12.0}))
-    assert line.startswith("In another session s is off by 11 um, 22.0 times noise and drift")
+    assert line.startswith("In another session s is off by 11 um (22.0 times noise and drift)")
     assert line.endswith("it may not be the same wrist, or not in the same state.")
     first, second = verdict_lines(replace(held_out, verdict="none"))
     assert first.startswith("Nothing is missing")

@@ -257,8 +257,8 @@ def _unfinished(result: Diagnosis) -> str:
 
 def _unforeseen(result: Diagnosis) -> str:
     errors = " and ".join(
-        f"{_name(key)} is off by {number(result.after[key])} {_unit(key)}, {over:.1f} times "
-        "noise and drift"
+        f"{_name(key)} is off by {number(result.after[key])} {_unit(key)} ({over:.1f} times noise "
+        "and drift)"
         for key, over in result.unforeseen.items()
     )
     why = (
