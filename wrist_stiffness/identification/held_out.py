@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from wrist_stiffness.identification.base_fit import BaseFit, without_units
-from wrist_stiffness.identification.likelihood import likelihood_of
+from wrist_stiffness.identification.likelihood import WristTable, likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.held_out import HeldOut, sealed_units
@@ -67,8 +68,12 @@ class Judge:
 
         `found`: tells how large both are.
         """
-        scatter = likelihood_of(self.whole).scatter(found, drift)[self.aside]
+        scatter = self._table.scatter(found, drift)[self.aside]
         return self.whole.problem.table.take(self.aside).rms(scatter)
+
+    @cached_property
+    def _table(self) -> WristTable:
+        return likelihood_of(self.whole)
 
     def of_fit(self, fitted: BaseFit) -> HeldOut:
         """Return what a fit to all sessions leaves of that part."""
