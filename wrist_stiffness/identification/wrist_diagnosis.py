@@ -48,7 +48,7 @@ Tell = Callable[[str], None]
 
 MUCH = 1.5
 """Error of another session, in times noise and drift, that is neither: of one wrist a fit to both
-leaves up to 1.1, of two 2 and more where noise does not hide it
+leaves up to 1.1, of two 1.7 and more where noise does not hide it
 (`pytest test/identification/test_diagnosing.py -k two_wrists`)."""
 
 
@@ -257,8 +257,11 @@ class _Judged:
 
 def _much(errors: Mapping[str, float], noise: Mapping[str, float]) -> dict[str, float]:
     """Return errors by quantity in times noise and drift, where they are far above them."""
-    over = {key: errors[key] / size for key, size in noise.items() if key in errors}
-    return {key: times for key, times in over.items() if times > MUCH}
+    return {
+        key: errors[key] / size
+        for key, size in noise.items()
+        if errors.get(key, 0.0) > MUCH * size > 0.0
+    }
 
 
 def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | None) -> Finding:
