@@ -89,7 +89,8 @@ class Extension:
     @cached_property
     def bought(self) -> dict[str, tuple[float, float]]:
         """Fall of the held-out error and its standard uncertainty, by the key of the quantity."""
-        return {q.key: bought(self.before, self.after, q) for q in self.quantities}
+        seen = self.after.rms(self.quantities)
+        return {q.key: bought(self.before, self.after, q) for q in self.quantities if q.key in seen}
 
     @property
     def base_moved(self) -> tuple[tuple[FittedParameter, FittedParameter], ...]:
