@@ -18,7 +18,7 @@ from wrist_stiffness.identification.free_effects import (
     commissioning,
     within_tolerances,
 )
-from wrist_stiffness.identification.problem import FitProblem, Unknown
+from wrist_stiffness.identification.problem import STEP, FitProblem, Unknown
 from wrist_stiffness.identification.questions import smooth_columns
 from wrist_stiffness.inference.outliers import OUTLIER_LIMIT, lost_units
 from wrist_stiffness.mechanism.components import Array
@@ -43,6 +43,11 @@ SMALLEST_STEP = 1.0 / 16.0
 BEGUN_WITH = 60
 """Measured units of each session, evenly spread, with which a fit begins: registrations are far off
 at first, and few units bring them near."""
+
+WIDTHS = (3.0, 1.0, 0.3, 0.1)
+"""Widths of differences, in standard deviations of the priors, with which a fit begins a second
+time: at a kink, where one unit turns a flange over, slopes lead no further; over a wide difference
+all units tell whereto."""
 
 ELSEWHERE = 1.5
 """Standard deviations from the mean at which a gap begins again (1, 1.5 and 2 lead as far)."""
@@ -184,6 +189,8 @@ def fit_base(
     if 0 < count < len(more):
         firm = replace(alone, free=(*free, *more[:count]))
     z = _start(problem, start, added)
+    if start is None:
+        z = _begun(problem, z).z
     near, known = _near(problem, start) if start is not None and same else (None, None)
     for force in ROUNDED_N if gradually else ():
         rounded = [replace(each, effect=_rounded(each.effect, force)) for each in more]
@@ -202,7 +209,7 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
     Returns the fit, whose problem lacks those units, and how many there were.
     """
     if start is None:
-        start = _led(_few(problem), np.zeros(len(problem.unknowns))).z
+        start = best_valley(problem)
     found, total = _descended(problem, problem, problem, start), 0
     for _ in range(MOST_CLEANINGS):
         table = problem.table.with_values(found.residual)
@@ -240,14 +247,32 @@ def best_valley(problem: FitProblem) -> Array:
     each gap on either side.
     """
     few = _few(problem)
-    found = [_led(few, np.zeros(len(few.unknowns)))]
+    best = _begun(problem)
+    found = [best]
     for place, unknown in enumerate(few.unknowns):
         if not (unknown.parameter.linear or unknown.effect.law.smooth):
             for side in (-ELSEWHERE, ELSEWHERE):
-                start = found[0].z.copy()
+                start = best.z.copy()
                 start[place] = side
                 found.append(_led(few, np.clip(start, *few.bounds)))
-    return min(found, key=lambda each: each.cost).z
+    return _best(*found).z
+
+
+def _begun(problem: FitProblem, start: Array | None = None) -> BaseFit:
+    """Return the better end of two fits to a few units, one that begins with wide differences.
+
+    `start` (p,): where both begin, in steps; by default at the means of the priors.
+    """
+    few = _few(problem)
+    z = np.zeros(len(few.unknowns)) if start is None else start
+    found = _led(few, z)
+    for width in WIDTHS:
+        z = _led(few, z, width).z
+    return _best(found, _led(few, z))
+
+
+def _best(*found: BaseFit) -> BaseFit:
+    return min(found, key=lambda each: each.cost)
 
 
 def _few(problem: FitProblem) -> FitProblem:
@@ -255,9 +280,9 @@ def _few(problem: FitProblem) -> FitProblem:
     return replace(problem, sessions=tuple(s.thinned(BEGUN_WITH) for s in problem.sessions))
 
 
-def _led(problem: FitProblem, start: Array) -> BaseFit:
+def _led(problem: FitProblem, start: Array, width: float = STEP) -> BaseFit:
     """Return where steps end nearly."""
-    return _descended(problem, problem, problem, start, NEARLY)
+    return _descended(problem, problem, problem, start, NEARLY, width=width)
 
 
 def has_walls(law: Law) -> bool:
@@ -283,6 +308,7 @@ def _descended(
     near: Array | None = None,
     known: Mask | None = None,
     kept: bool = False,
+    width: float = STEP,
 ) -> BaseFit:
     """Return where Gauss-Newton steps lead from `z`.
 
@@ -297,7 +323,7 @@ def _descended(
     scale, columns = 0.0, near
     for _ in range(MOST_STEPS):
         fresh = columns is None
-        columns = _columns(problem, firm, z, columns, known)
+        columns = _columns(problem, firm, z, columns, known, width)
         left = problem.whiten(residual)
         found = _robust_variance(left)
         scale = max(found, COOLING * scale)
@@ -328,6 +354,7 @@ def _columns(
     z: Array,
     near: Array | None = None,
     known: Mask | None = None,
+    width: float = STEP,
 ) -> Array:
     """Return the columns of one problem, and of what another has on top of it, (u, 6, p).
 
@@ -346,7 +373,7 @@ def _columns(
         here = wanted[own] if of is firm else wanted & ~in_firm
         if here.any():
             places = None if here.all() else tuple(np.flatnonzero(here).tolist())
-            columns[:, :, own[here]] = of.columns_at(z[own], places)
+            columns[:, :, own[here]] = of.columns_at(z[own], places, width)
     return columns
 
 

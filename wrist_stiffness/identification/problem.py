@@ -234,30 +234,36 @@ class FitProblem:
             blocks.append(session.residual(model.along([effects])[0]))
         return self.rows(blocks)
 
-    def columns(self, z: Array, places: Collection[int] | None = None) -> Array:
+    def columns(
+        self, z: Array, places: Collection[int] | None = None, width: float = STEP
+    ) -> Array:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
         By one-sided differences, away from the nearer bound.  Effects with a past do beside another
         parameter what they do beside this one: so only their own columns follow the path anew.
 
         `z` (p,): steps from the prior means; `places`: which unknowns are asked for; all by
-        default.
+        default; `width`: of the differences, in steps.
         Those are in the order of `places`.
         """
         asked = list(range(len(self.unknowns)) if places is None else places)
-        return self._slopes(z, asked, lambda session, twists: session.residual(twists))
+        return self._slopes(z, asked, lambda session, twists: session.residual(twists), width)
 
     def twists(self, z: Array) -> Array:
         """Return by how much a step of each unknown turns and shifts the platform, (u, 6, p)."""
-        return self._slopes(z, list(range(len(z))), lambda session, twists: twists)
+        return self._slopes(z, list(range(len(z))), lambda session, twists: twists, STEP)
 
     def _slopes(
-        self, z: Array, asked: list[int], shown: Callable[[UnitSession, Array], Array]
+        self,
+        z: Array,
+        asked: list[int],
+        shown: Callable[[UnitSession, Array], Array],
+        width: float,
     ) -> Array:
         """Return the change by a step of some unknowns of what twists (t, u, 6) are shown as."""
         blocks = []
         for number, session in enumerate(self.sessions):
-            twists, moved, step = self._trials(number, z, asked)
+            twists, moved, step = self._trials(number, z, asked, width)
             first, *others = shown(session, np.stack(twists))
             block = np.zeros((*first.shape, len(z)))
             for place, other in zip(moved, others, strict=True):
@@ -266,7 +272,7 @@ class FitProblem:
         return self.rows(blocks)
 
     def _trials(
-        self, number: int, z: Array, asked: list[int]
+        self, number: int, z: Array, asked: list[int], width: float
     ) -> tuple[list[Array], list[int], Array]:
         """Return a session's predicted twists (u, 6), and those with a step of some unknowns."""
         model = self._models[number]
@@ -274,7 +280,8 @@ class FitProblem:
         effects = self._with_values(values)
         whole = (*self.model.effects, *effects)
         held = model.held(whole)
-        step = np.where(z + STEP <= self.bounds[1], STEP, -STEP)
+        up, down = (np.minimum(width, room) for room in (self.bounds[1] - z, z - self.bounds[0]))
+        step = np.where(up >= down, up, -down)
         moved, trials = [], [_as_held(whole, held)]
         for place in asked:
             unknown = self.unknowns[place]
@@ -296,22 +303,24 @@ class FitProblem:
             and self.free == other.free
         )
 
-    def columns_at(self, z: Array, places: tuple[int, ...] | None = None) -> Array:
+    def columns_at(
+        self, z: Array, places: tuple[int, ...] | None = None, width: float = STEP
+    ) -> Array:
         """Return `columns`, of the last few points without evaluating anew; not to be changed.
 
         A fit ends where its last step failed, and the next one begins where it ended.
         """
-        key = (z.tobytes(), places)
+        key = (z.tobytes(), places, width)
         if key not in self._known:
             if len(self._known) == MOST_POINTS:
                 self._known.pop(next(iter(self._known)))
-            found = self.columns(z, places)
+            found = self.columns(z, places, width)
             found[..., np.linalg.norm(self.whiten(found), axis=0) < SILENT] = 0.0
             self._known[key] = found
         return self._known[key]
 
     @cached_property
-    def _known(self) -> dict[tuple[bytes, tuple[int, ...] | None], Array]:
+    def _known(self) -> dict[tuple[bytes, tuple[int, ...] | None, float], Array]:
         return {}
 
     @cached_property
