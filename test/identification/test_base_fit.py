@@ -77,8 +77,8 @@ def effect(law, place, **values):
 
 
 @pytest.mark.slow
-def test_rounded_walls_lead_past_the_pins_that_turn_over(model, in_the_cell):
-    """Play of 5 um and friction: with sharp walls a fit ends at the next pin that turns over."""
+def test_wide_differences_lead_past_the_pins_that_turn_over(model, in_the_cell):
+    """Play of 5 um and friction: slopes lead no further than the next pin that turns over."""
     hidden = (
         HiddenEffect("joint_clearance", "joint_3", "algebraic", 5e-6, 5),
         HiddenEffect("joint_friction", "joint_2", "coulomb", 0.2, 6),
@@ -100,7 +100,5 @@ def test_rounded_walls_lead_past_the_pins_that_turn_over(model, in_the_cell):
     sharp = fit_base(model, units, extras, base)
     found = fit_base(model, units, extras, base, gradually=True)
     assert found.cost < 0.5 * sharp.cost
-    # What is handed on is play as it is.
-    assert all(each.law is find_law(each.law.id) for each in found.effects(0))
     play = found.beyond()["joint_clearance@joint_3"].estimates["clearance_um"]
     assert play.value == pytest.approx(5.0, rel=0.1)

@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import brentq
 
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
-from wrist_stiffness.model.registry import find_law
 
 RADIAL = 1e-5
 ROUNDING = 1e-12 * RADIAL
@@ -154,13 +153,3 @@ def test_an_end_that_carries_little_goes_a_part_of_the_way_to_its_wall(small):
     force = small * np.array([[0.25, 0.0, 0.0, -0.5]])
     free = replace(hindered(0), force=force, opening=np.zeros((1, SECTORS, 4)), small_force=small)
     assert free.resting() == pytest.approx(RADIAL * force / small, rel=1e-9)
-
-
-def test_play_with_rounded_walls_knows_the_law_that_it_is_of():
-    law = find_law("joint_clearance")
-    easy = law.rounded(1.0)
-    assert easy is law.rounded(1.0)
-    assert easy is not law
-    assert easy.rounded(None) is law
-    assert easy.rounded(0.3).rounded(None) is law
-    assert find_law("backlash").rounded(1.0) is find_law("backlash")

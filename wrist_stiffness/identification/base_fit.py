@@ -24,7 +24,6 @@ from wrist_stiffness.inference.outliers import OUTLIER_LIMIT, lost_units
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.law import Law
 from wrist_stiffness.sessions.columns import SessionModel
 from wrist_stiffness.sessions.unit_session import UnitSession
 from wrist_stiffness.sessions.units import Mask
@@ -36,7 +35,7 @@ COOLING = 0.05
 
 ENOUGH, NEARLY = 3e-3, 3e-2
 """Relative fall of the sum of squares below which a fit has converged; the second of a quick fit,
-and with rounded walls."""
+and over wide differences."""
 
 SMALLEST_STEP = 1.0 / 16.0
 
@@ -45,20 +44,15 @@ BEGUN_WITH = 60
 at first, and few units bring them near."""
 
 WIDTHS = (3.0, 1.0, 0.3, 0.1)
-"""Widths of differences, in standard deviations of the priors, with which a fit begins a second
-time: at a kink, where one unit turns a flange over, slopes lead no further; over a wide difference
-all units tell whereto."""
+"""Widths of differences, in standard deviations of the priors, with which a fit that begins far off
+begins once more: the sum of squares has a kink for every unit in which a flange touches or a pin
+turns over, and slopes lead no further than the next one; a wide difference sees past them."""
 
 ELSEWHERE = 1.5
 """Standard deviations from the mean at which a gap begins again (1, 1.5 and 2 lead as far)."""
 
 MOST_CLEANINGS = 3
 """Fits after which lost beams are looked for."""
-
-ROUNDED_N = (1.0, 0.3, 0.1, 0.03)
-"""Forces within which a pin goes from wall to wall, before the fit with the law as it is: from one
-wall to the other the sum of squares has a minimum for every pin that turns over, and steps end in
-the next one (graduated non-convexity, Blake and Zisserman 1987)."""
 
 Base = tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]
 """What of a model is free, and what stays as it is."""
@@ -167,13 +161,10 @@ def fit_base(
     quickly : bool
         Whether the columns of the base's start serve to the end: nearly as far, far quicker.
     gradually : bool
-        Whether pins go from wall to wall little by little first, and the base's columns are taken
-        beside play too; else as if no play were there, which is far quicker and leads nearly as
-        far.
+        Whether differences are wide first, and the base's columns are taken beside play too; else
+        as if no play were there, which is far quicker and leads nearly as far.
     """
     free, held = base or free_base(model)
-    # What was fitted with rounded walls begins with its own law again.
-    extras = [_rounded(effect, None) for effect in extras]
     added = {effect.name: effect for effect in extras}
     usual = {each.effect.name for each in free}
     # Those on top of the base follow it, and play comes last.
@@ -192,10 +183,8 @@ def fit_base(
     if start is None:
         z = _begun(problem, z).z
     near, known = _near(problem, start) if start is not None and same else (None, None)
-    for force in ROUNDED_N if gradually else ():
-        rounded = [replace(each, effect=_rounded(each.effect, force)) for each in more]
-        easy = replace(problem, free=(*free, *rounded))
-        found = _descended(easy, alone, easy, z, NEARLY, near, known)
+    for width in WIDTHS if gradually else ():
+        found = _descended(problem, alone, problem, z, NEARLY, near, known, width=width)
         z, near = found.z, found.columns
     enough = NEARLY if quickly else ENOUGH
     return _descended(problem, alone, firm, z, enough, near, known, quickly)
@@ -283,20 +272,6 @@ def _few(problem: FitProblem) -> FitProblem:
 def _led(problem: FitProblem, start: Array, width: float = STEP) -> BaseFit:
     """Return where steps end nearly."""
     return _descended(problem, problem, problem, start, NEARLY, width=width)
-
-
-def has_walls(law: Law) -> bool:
-    """Tell whether a law goes from wall to wall, so that it can be rounded.
-
-    Slopes about its absence say next to nothing, and beside it each slope of the base is a search
-    for where the pins rest.
-    """
-    return law.rounded(ROUNDED_N[0]) is not law.rounded(None)
-
-
-def _rounded(effect: Effect, force: float | None) -> Effect:
-    law = effect.law.rounded(force)
-    return effect if law is effect.law else replace(effect, law=law)
 
 
 def _descended(

@@ -15,7 +15,6 @@ from wrist_stiffness.identification.base_fit import (
     fit_base,
     fit_cleaned,
     free_base,
-    has_walls,
 )
 from wrist_stiffness.identification.candidates import (
     Point as WristPoint,
@@ -96,7 +95,11 @@ class WristProblem:
         ]
         law = candidate.law
         return Trial(
-            candidate.name, law.smooth, tuple(blocks), candidate.possible, walls=has_walls(law)
+            candidate.name,
+            law.smooth,
+            tuple(blocks),
+            candidate.possible,
+            walls=law.state_is_a_guess,
         )
 
     def giving(self, fit: WristFit) -> Sequence[tuple[Array, WristFit]]:
@@ -121,7 +124,7 @@ class WristProblem:
     def _nearly(self, fit: WristFit, candidate: WristCandidate, ranked: Ranked) -> WristFit:
         if candidate not in self._near:
             begun = candidate.effect(ranked.z, ranked.shape)
-            if has_walls(begun.law):
+            if begun.law.state_is_a_guess:
                 begun = _best_of(fit.base, self.about(fit), begun, _plays(begun))
             self._near[candidate] = self.beside(fit, begun)
         return self._near[candidate]
@@ -175,7 +178,7 @@ class WristProblem:
             found = self._fitted(extras, start)
             if found.base.variance > LEAVES_MUCH and found.base.cost < HELPS * fit.base.cost:
                 tried = [found, self._fitted(extras, None)]
-                if any(has_walls(each.law) for each in extras):
+                if any(each.law.state_is_a_guess for each in extras):
                     tried.append(self._fitted(extras, fit.base, gradually=True))
                 found = min(tried, key=lambda each: each.base.cost)
         except WristError:
@@ -207,7 +210,9 @@ class WristProblem:
         models = []
         for number in range(len(self._sessions)):
             own = fit.base.model(number)
-            beside = tuple(e for e in own.effects if not (e.name in fit.names and has_walls(e.law)))
+            beside = tuple(
+                e for e in own.effects if not (e.name in fit.names and e.law.state_is_a_guess)
+            )
             models.append(replace(own, effects=beside))
         return WristPoint(tuple(models))
 

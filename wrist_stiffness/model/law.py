@@ -164,14 +164,6 @@ class Law:
         """Return the same of a law that remembers nothing."""
         return NOTHING
 
-    def rounded(self, force: float | None) -> Law:
-        """Return the law with what forces below `force` [N] turn over made gradual.
-
-        With it a fit begins that would be caught between samples that turn over; with None it is
-        the law as it is.
-        """
-        return self
-
     def stage_at(self, place: str) -> Stage:
         """Return what the law changes at a place."""
         return self.stage

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.model.contribution import NOTHING, Contribution
-from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
+from wrist_stiffness.model.pin_play import WALLS, Play
 from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.rubbing import Rubbing, dragged, slip
 from wrist_stiffness.model.situation import Situation
@@ -83,7 +83,6 @@ class Pin:
     at: Situation  # n samples
     place: str
     radial: float  # how far an end may move from the middle [m], above 0
-    small_force: float = SMALL_FORCE  # with less an end does not reach its wall altogether [N]
 
     def rest(self, before: Rest | None) -> tuple[Contribution, Rest]:
         """Return what the play adds, and where the pin rests.
@@ -143,7 +142,6 @@ class Pin:
                 drag,
                 np.stack([each.compliance for each in bristles], axis=1),
                 np.stack([each.budget for each in bristles], axis=1),
-                small_force=self.small_force,
             )
             x = held.resting(x)
             force = held.held(x)[1]
@@ -163,7 +161,7 @@ class Pin:
         flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
         gap, approach = at.free[1], at.operators.approach
         force = carried - flanges
-        return Play(self.radial, force, gap, opening, approach, small_force=self.small_force)
+        return Play(self.radial, force, gap, opening, approach)
 
     def _drag(self, rubbing: Rubbing) -> Array:
         """Return how a joint turns (radius times angle) and slides with the pin's ends."""

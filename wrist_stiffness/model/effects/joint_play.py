@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.model.columns import Recipe, at_usual_size, share_of_shape
 from wrist_stiffness.model.law import NOTHING, Contribution, Law, Outcome, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.model.pin_play import SMALL_FORCE
 from wrist_stiffness.model.pin_rest import Pin
 
 GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
@@ -50,9 +48,6 @@ class JointClearance(Law):
     end moves by half the diametral clearance along its own.  Equal end forces shift the pin,
     opposite ones tilt it.  A flange that touches pushes the pin back within its play, and a joint
     that rubs holds it.
-
-    `small_force`: with less an end does not reach its wall altogether [N]; `sharp`: the law of
-    which this one has rounded walls.
     """
 
     id = "joint_clearance"
@@ -65,15 +60,6 @@ class JointClearance(Law):
     smooth = False
     own = (Parameter("clearance_um", 0.0, 2000.0, 20.0),)
 
-    def __init__(
-        self, small_force: float = SMALL_FORCE, sharp: JointClearance | None = None
-    ) -> None:
-        self._small_force, self._sharp = small_force, sharp or self
-
-    def rounded(self, force: float | None) -> Law:
-        """Return play in which a pin goes from wall to wall little by little."""
-        return self._sharp if force is None else _rounded(self._sharp, force)
-
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return the column of a small clearance, in which no flange stands in the way."""
         return at_usual_size(self.own[0], 5.0)
@@ -83,9 +69,4 @@ class JointClearance(Law):
         radial = 0.5 * values["clearance_um"]
         if radial == 0.0:
             return NOTHING, None
-        return Pin(at, place, radial, self._small_force).rest(state)
-
-
-@cache
-def _rounded(sharp: JointClearance, force: float) -> JointClearance:
-    return JointClearance(force, sharp)
+        return Pin(at, place, radial).rest(state)
