@@ -13,6 +13,9 @@ from wrist_stiffness.model.places import bushing_centre, cross_axes
 NEAR_SIDE = {"joint_2": "link_1", "joint_3": "link_3", "joint_4": "link_2"}
 """The link on the motor's side of a joint: the far side of the joint before."""
 
+RIM = np.repeat([1.0, 0.05], 3)
+"""Factors of a twist at O [-], [m]."""
+
 
 def constant_screw(place, direction):
     law = FormulaLaw("planted", place, np.asarray(direction, dtype=float), "size", [], ["size"])
@@ -51,7 +54,8 @@ def test_the_felt_directions_are_all_that_can_be_felt(free_model, make, joint, h
         direction = np.zeros(6)
         direction[half : half + 3] = axis
         planted = constant_screw(NEAR_SIDE[joint], bore @ direction)
-        columns.append(make.added(free_model, planted, block).ravel())
+        # A turn counts by what it moves at the rim of the wrist.
+        columns.append((make.added(free_model, planted, block) * RIM).ravel())
     size = np.linalg.norm(columns, axis=1)
     felt = len(FELT[joint]) - (joint == "joint_3" and half == 0)
     assert np.all(size[felt:] < 1e-9 * size.max())
