@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.identification.base_fit import fit_cleaned
-from wrist_stiffness.identification.calibration import fitted, told_model
+from wrist_stiffness.identification.calibration import calibrate, fitted, told_model
 from wrist_stiffness.identification.free_effects import FreeEffect, commissioning, free_all
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
@@ -18,9 +18,9 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.report.fit_lines import used_lines
+from wrist_stiffness.report.fit_lines import refused_line, used_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.refitted import AXES, GAPS
+from wrist_stiffness.sessions.refitted import AXES, GAPS, SET_UP
 from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
@@ -297,6 +297,21 @@ def test_two_sessions_have_registrations_of_their_own_and_one_wrist(model):
         assert abs(each.value - planted) < 3.0 * each.sigma
     newest = {e.name: e for e in found.model().effects}["measurement_frame@pose_sensor"]
     assert newest.estimates["shift_x_um"].value == pytest.approx(tuesday.value)
+
+
+def test_what_makes_another_day_worse_is_not_handed_over(model):
+    """Of two wrists the first one's axis is no knowledge of the second."""
+    rng = np.random.default_rng(4)
+    bent = model.with_effects(effect("axis_misalignment@joint_2", shift_u_um=60.0))
+    days = [
+        replace(measured(own, poses(rng), rng), name=name)
+        for own, name in ((bent, "bent"), (model, "straight"))
+    ]
+    found = calibrate(model, days)
+    assert found.refused["s_um"] > 3.0 * found.after["s_um"]
+    assert {each.law.id for each in found.model.effects} <= {law for law, _ in SET_UP}
+    assert "the part that judges comes out worse" in refused_line(found)
+    assert not calibrate(model, [days[1], replace(days[1], name="again")]).refused
 
 
 def test_parameters_that_are_told_together_only_name_each_other(model):

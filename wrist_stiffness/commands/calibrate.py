@@ -36,6 +36,7 @@ class Calibrated:
         return {
             **fit_values(found.fit, found.before, found.after, found.judged_by, self.sessions),
             "set_up_mistake": self.mistake,
+            "refused": {f"rmse_{key}": value for key, value in found.refused.items()},
             "calibrated_otherwise": list(found.calibrated),
             "parameters": parameter_values(found.parameters),
         }

@@ -14,6 +14,7 @@ from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem, require_units
 from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.inference.held_out import refuted
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
@@ -43,6 +44,9 @@ class Calibration:
     after: Mapping[str, float]
     judged_by: str  # see `judge`
     calibrated: tuple[str, ...]  # ids of effects that the recordings say need no fit
+    # error of what was found of the wrist, where it made those units worse and only the set-up is
+    # handed over; else empty
+    refused: Mapping[str, float]
 
     @cached_property
     def parameters(self) -> tuple[FittedParameter, ...]:
@@ -69,7 +73,8 @@ def calibrate(
         Its effects are starts of what is fitted, or stay as they are.
     sessions : sequence of MeasuredSession
         In the order of time.  Of several the last one judges what the others tell, of one its end;
-        what is handed over is fitted to all.
+        what is handed over is fitted to all.  What makes that part worse is not: then the wrist
+        stays as the model has it.
     progress : callable
         Told steps done and steps at most.
     again : bool
@@ -100,20 +105,35 @@ def calibrate(
     progress(0, STEPS)
     first, lost = fit_cleaned(problem)
     progress(1, STEPS)
-    found = fitted(first, lost)
+    judge, set_up = Judge(first), _set_up_of(first.problem, start)
+    after, without = (
+        judge.left(fit_cleaned(replace(own, sessions=judge.seen), z)[0])
+        for own, z in ((problem, first.z), (set_up, None))
+    )
+    reported, refused = first.problem.table.reported, {}
+    if refuted(without, after):
+        refused, after = after.rms(reported), without
+        first = fit_cleaned(set_up)[0]
     progress(2, STEPS)
-    judge = Judge(first)
-    after = judge.left(fit_cleaned(replace(problem, sessions=judge.seen), first.z)[0])
+    found = fitted(first, lost)
     before = judge.of_model(model)
     progress(STEPS, STEPS)
-    reported = first.problem.table.reported
     return Calibration(
         found,
         before.rms(reported),
         after.rms(reported),
         judge.by,
         calibrated,
+        refused,
     )
+
+
+def _set_up_of(problem: FitProblem, model: ErrorModel) -> FitProblem:
+    """Return the problem of the set-up of each session, beside the wrist as a model has it."""
+    free = tuple(each for each in problem.free if each.per_session)
+    fitted = {each.effect.name for each in free}
+    wrist = (each for each in model.effects if each.name not in fitted)
+    return replace(problem, model=model.with_effects(*wrist), free=free)
 
 
 def fitted(base: BaseFit, lost: int) -> WristFit:
