@@ -46,7 +46,9 @@ at first, and few units bring them near."""
 WIDTHS = (3.0, 1.0, 0.3, 0.1)
 """Widths of differences, in standard deviations of the priors, with which a fit that begins far off
 begins once more: the sum of squares has a kink for every unit in which a flange touches or a pin
-turns over, and slopes lead no further than the next one; a wide difference sees past them."""
+turns over, and slopes lead no further than the next one; a wide difference sees past them
+(graduated non-convexity, Blake and Zisserman 1987; `pytest test/identification/test_base_fit.py -k
+lead`)."""
 
 ELSEWHERE = 1.5
 """Standard deviations from the mean at which a gap begins again (1, 1.5 and 2 lead as far)."""
