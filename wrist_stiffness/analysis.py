@@ -241,7 +241,9 @@ class Analysis:
         """Fit set-up and tolerances of the newest model; it becomes a version."""
         found = calibrate(self._known(), self.sessions, self._watched(self._progress))
         step = Step("calibrate", "", "", {})
-        return self._became("calibrated", found.model, step, found.after, found.fit)
+        return self._became(
+            "calibrated", found.model, step, found.after, found.fit, None, found.warnings
+        )
 
     def rank(self, naming: float = NAMING, seconds: float = np.inf) -> WristDiagnosis:
         """Ask which effect the newest model misses.

@@ -18,7 +18,7 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.report.fit_lines import refused_line, used_lines
+from wrist_stiffness.report.fit_lines import used_lines
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import AXES, GAPS, SET_UP
 from wrist_stiffness.sessions.unit_session import as_units
@@ -310,7 +310,7 @@ def test_what_makes_another_day_worse_is_not_handed_over(model):
     found = calibrate(model, days)
     assert found.refused["s_um"] > 3.0 * found.after["s_um"]
     assert {each.law.id for each in found.model.effects} <= {law for law, _ in SET_UP}
-    assert "the part that judges comes out worse" in refused_line(found)
+    assert "the part that judges comes out worse" in found.warnings[0]
     assert not calibrate(model, [days[1], replace(days[1], name="again")]).refused
 
 

@@ -53,6 +53,22 @@ class Calibration:
         """All that was fitted."""
         return self.fit.parameters
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """That what was found of the wrist is not handed over, and why."""
+        if not self.refused:
+            return ()
+        worse = " and ".join(
+            f"{self.refused[q.key]:.3g} instead of {self.after[q.key]:.3g} {q.unit} of {q.name}"
+            for q in self.fit.problem.table.reported
+            if self.refused.get(q.key, 0.0) > self.after.get(q.key, 0.0)
+        )
+        return (
+            "only the set-up was fitted. With what these recordings say of the wrist, the part "
+            f"that judges comes out worse: {worse}. An effect is missing ('wrist-stiffness "
+            "diagnose' finds out which), or it is not the same wrist.",
+        )
+
     @cached_property
     def model(self) -> ErrorModel:
         """The model of the newest session; effects of which the data say nothing are left out."""

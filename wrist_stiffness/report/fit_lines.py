@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wrist_stiffness.identification.calibration import Calibration
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
 from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
@@ -38,7 +37,7 @@ def calibration_lines(found: Calibrated) -> list[str]:
     result, parameters = found.calibration, found.calibration.parameters
     rows = {"model as it stands": result.before, "calibrated": result.after}
     lines = _judged_lines(found.sessions, result.fit, result.judged_by, rows)
-    lines += [refused_line(result)] if result.refused else []
+    lines += [f"WARNING: {warning}" for warning in result.warnings]
     lines += [found.mistake] if found.mistake else []
     parts = {
         f"set up in {session.name}:": told_lines(p for p in parameters if p.session == session.name)
@@ -60,20 +59,6 @@ def calibration_lines(found: Calibrated) -> list[str]:
     if result.calibrated:
         lines += ["", f"not fitted, calibrated as the notes say: {', '.join(result.calibrated)}"]
     return lines
-
-
-def refused_line(found: Calibration) -> str:
-    """Say that only the set-up was fitted, and why."""
-    worse = " and ".join(
-        f"{found.refused[q.key]:.3g} instead of {found.after[q.key]:.3g} {q.unit} of {q.name}"
-        for q in found.fit.problem.table.reported
-        if found.refused.get(q.key, 0.0) > found.after.get(q.key, 0.0)
-    )
-    return (
-        "WARNING: only the set-up was fitted. With what these recordings say of the wrist, the "
-        f"part that judges comes out worse: {worse}. An effect is missing ('wrist-stiffness "
-        "diagnose' finds out which), or it is not the same wrist."
-    )
 
 
 def extension_lines(found: Extended) -> list[str]:
