@@ -205,7 +205,7 @@ def test_columns_are_the_derivative_of_the_residual(model):
     # A flange that is about to touch has two derivatives: what only flanges feel stays at zero.
     names = [(problem.free[u.free].effect.name, u.key) for u in problem.unknowns]
     z = np.where([n == ("axis_misalignment@joint_3", "shift_v_um") for n in names], 0.0, 0.2)
-    columns = problem.columns(z, width=1e-3)
+    columns = problem.columns(z)
     for place in range(len(z)):
         step = np.zeros(len(z))
         step[place] = 1e-3

@@ -162,13 +162,11 @@ def test_what_answers_to_both_speeds_is_one_law_that_can_be_added(model, day, tm
 
 
 def test_a_clamp_that_comes_loose_is_told_by_all_forces_and_the_time(model, day):
-    """So at the frame, link_1 and link_2; at link_3 the component is not told from link_2."""
-    day = day.take(np.arange(600))
     text = ", ".join(f"soft_um * f{axis} * (time - {day.block.time[0]:.3f})" for axis in "xyz")
     ways = np.concatenate([[[0.6, 0, 0], [0, 1.0, 0.3], [0, 0.3, 0.8]], np.zeros((3, 3))], axis=1)
-    found = proposed(model, planted(model, day, "platform", ways, text, soft_um=0.3))
+    found = proposed(model, planted(model, day, "link_3", ways, text, soft_um=0.3))
     assert found.terms[0].form.name == "a product of fx, fy, fz and time"
-    assert "platform" in (found.terms[0].component, *twins(found.terms[0].component))
+    assert "link_3" in (found.terms[0].component, *twins(found.terms[0].component))
 
 
 @pytest.mark.parametrize(

@@ -3,18 +3,14 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.mechanism.vectors import screws_to_origin
 from wrist_stiffness.model.effect import Effect
-from wrist_stiffness.model.effects.axis_misalignment import FELT
+from wrist_stiffness.model.effects.axis_misalignment import SHIFTS, TILTS
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
-from wrist_stiffness.model.places import bushing_centre, cross_axes
+from wrist_stiffness.model.places import cross_axes
 
 NEAR_SIDE = {"joint_2": "link_1", "joint_3": "link_3", "joint_4": "link_2"}
 """The link on the motor's side of a joint: the far side of the joint before."""
-
-RIM = np.repeat([1.0, 0.05], 3)
-"""Factors of a twist at O [-], [m]."""
 
 
 def constant_screw(place, direction):
@@ -41,23 +37,22 @@ def test_far_side_of_one_joint_is_near_side_of_the_next(model, make, joint):
 
 
 @pytest.mark.parametrize("joint", NEAR_SIDE)
-@pytest.mark.parametrize("half", [0, 3])
-def test_the_felt_directions_are_all_that_can_be_felt(free_model, make, joint, half):
+@pytest.mark.parametrize(("half", "felt"), [(0, SHIFTS), (3, TILTS)])
+def test_the_felt_directions_are_all_that_can_be_felt(free_model, make, joint, half, felt):
     """Among all directions of the body as many are felt as the law has, over all poses.
 
     But for joint_3's v, which slides link_3 along joint_4: without flanges nothing shows it.
     """
     block = poses(make)
-    geometry, columns = free_model.table.geometry, []
-    bore = screws_to_origin(bushing_centre(geometry, joint))
-    for axis in cross_axes(geometry, joint):
+    axes = cross_axes(free_model.table.geometry, joint)
+    columns = []
+    for axis in axes:
         direction = np.zeros(6)
         direction[half : half + 3] = axis
-        planted = constant_screw(NEAR_SIDE[joint], bore @ direction)
-        # A turn counts by what it moves at the rim of the wrist.
-        columns.append((make.added(free_model, planted, block) * RIM).ravel())
+        planted = constant_screw(NEAR_SIDE[joint], direction)
+        columns.append(make.added(free_model, planted, block).ravel())
     size = np.linalg.norm(columns, axis=1)
-    felt = len(FELT[joint]) - (joint == "joint_3" and half == 0)
+    felt = len(felt[joint]) - (joint == "joint_3" and half == 0)
     assert np.all(size[felt:] < 1e-9 * size.max())
     singular = np.linalg.svd(columns[:felt], compute_uv=False)
     assert singular[-1] > 0.05 * singular[0]

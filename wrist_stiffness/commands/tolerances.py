@@ -22,12 +22,11 @@ from wrist_stiffness.identification.free_effects import EVENLY_SPREAD, SHIM_UM
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.model.places import bushing_centre, cross_axes
+from wrist_stiffness.model.places import cross_axes
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.refitted import AXES, BUILT, GAPS
@@ -256,14 +255,10 @@ def _shims(table: Table, tolerances: Sequence[Tolerance]) -> dict[str, Array]:
 
 
 def _shift(table: Table, tolerance: Tolerance) -> Array:
-    """Return the shift at O [um] by one unit of a tolerance, (3,)."""
     kind, _, rest = tolerance.key.partition("_")
-    if tolerance.law != AXES:
+    if tolerance.law != AXES or kind != "shift":
         return np.zeros(3)
-    along: Array = cross_axes(table.geometry, tolerance.place)["uvw".index(rest[0])]
-    if kind == "shift":
-        return along
-    return 1e6 * np.radians(1e-3) * cross(bushing_centre(table.geometry, tolerance.place), along)
+    return np.asarray(cross_axes(table.geometry, tolerance.place)["uvw".index(rest[0])])
 
 
 def _study(

@@ -5,27 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from wrist_stiffness.mechanism.components import JOINTS
-from wrist_stiffness.mechanism.vectors import screws_to_origin
 from wrist_stiffness.model.law import Contribution, Law, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter, symmetric
-from wrist_stiffness.model.places import bushing_centre, cross_axes
+from wrist_stiffness.model.places import cross_axes
 
-FELT = {
+SHIFTS = {
     "joint_1": "uvw",
     "joint_2": "uv",
     "joint_3": "uv",
     "joint_4": "uv",
     "joint_5": "uvw",
 }
-"""Directions of shift and tilt that reach the platform or a flange: a cylindrical joint takes up
-what is along and about its own axis.  joint_3's body on the motor's side, link_3, also slides along
-and turns about joint_4: a shift along v is felt only where a flange of joint_4 touches."""
+"""Directions of a shift that reach the platform or a flange: a cylindrical joint takes up its own
+axis.  joint_3's body on the motor's side, link_3, also slides along joint_4: its v is felt only
+where a flange of joint_4 touches."""
+
+TILTS = SHIFTS | {"joint_3": "u"}
+"""Directions of a tilt that reach the platform: link_3 also turns about joint_4."""
 
 
 class AxisMisalignment(Law):
-    """Constant screw at the bushing, fixed in the body on the motor's side of the joint.
-
-    A drawing limits where a bore is and how it is tilted there: at O, a tilt is a shift as well.
+    """Constant screw at O, fixed in the body on the motor's side of the joint.
 
     w is the joint's axis at home, u is perpendicular to it and to the other axis of its link (the
     frame-side joints: to the next axis), v = w x u.
@@ -44,17 +44,15 @@ class AxisMisalignment(Law):
     def parameters(self, place: str) -> tuple[Parameter, ...]:
         """Return shifts and tilts along and about the felt directions."""
         return (
-            *(symmetric(f"shift_{axis}_um", 5000.0, 30.0) for axis in FELT[place]),
-            *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in FELT[place]),
+            *(symmetric(f"shift_{axis}_um", 5000.0, 30.0) for axis in SHIFTS[place]),
+            *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in TILTS[place]),
         )
 
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the screw, turned with its body."""
-        geometry, felt = at.table.geometry, FELT[place]
-        axes = cross_axes(geometry, place)[: len(felt)]
+        axes = cross_axes(at.table.geometry, place)
         shift, tilt = (
-            np.array([values[f"{kind}_{axis}_{unit}"] for axis in felt]) @ axes
-            for kind, unit in (("shift", "um"), ("tilt", "mdeg"))
+            np.array([values[f"{kind}_{axis}_{unit}"] for axis in felt]) @ axes[: len(felt)]
+            for kind, felt, unit in (("shift", SHIFTS[place], "um"), ("tilt", TILTS[place], "mdeg"))
         )
-        at_bore = np.concatenate([shift, tilt])
-        return at.screw(place, screws_to_origin(bushing_centre(geometry, place)) @ at_bore)
+        return at.screw(place, np.concatenate([shift, tilt]))
