@@ -183,7 +183,7 @@ def fit_base(
         firm = replace(alone, free=(*free, *more[:count]))
     z = _start(problem, start, added)
     if start is None:
-        z = _begun(problem, z).z
+        z = _best(*_begun(_few(problem), z)).z
     near, known = _near(problem, start) if start is not None and same else (None, None)
     for width in WIDTHS if gradually else ():
         found = _descended(problem, alone, problem, z, NEARLY, near, known, width=width)
@@ -238,28 +238,23 @@ def best_valley(problem: FitProblem) -> Array:
     each gap on either side.
     """
     few = _few(problem)
-    best = _begun(problem)
-    found = [best]
+    sharp, wide = _begun(few, np.zeros(len(few.unknowns)))
+    found = [sharp, wide]
     for place, unknown in enumerate(few.unknowns):
         if not (unknown.parameter.linear or unknown.effect.law.smooth):
             for side in (-ELSEWHERE, ELSEWHERE):
-                start = best.z.copy()
+                start = sharp.z.copy()
                 start[place] = side
                 found.append(_led(few, np.clip(start, *few.bounds)))
     return _best(*found).z
 
 
-def _begun(problem: FitProblem, start: Array | None = None) -> BaseFit:
-    """Return the better end of two fits to a few units, one that begins with wide differences.
-
-    `start` (p,): where both begin, in steps; by default at the means of the priors.
-    """
-    few = _few(problem)
-    z = np.zeros(len(few.unknowns)) if start is None else start
-    found = _led(few, z)
+def _begun(few: FitProblem, z: Array) -> tuple[BaseFit, BaseFit]:
+    """Return where steps from `z` (p,) lead, and where they do with wide differences first."""
+    sharp = _led(few, z)
     for width in WIDTHS:
         z = _led(few, z, width).z
-    return _best(found, _led(few, z))
+    return sharp, _led(few, z)
 
 
 def _best(*found: BaseFit) -> BaseFit:
