@@ -182,8 +182,6 @@ def fit_base(
     if 0 < count < len(more):
         firm = replace(alone, free=(*free, *more[:count]))
     z = _start(problem, start, added)
-    if start is None:
-        z = _best(*_begun(_few(problem), z)).z
     near, known = _near(problem, start) if start is not None and same else (None, None)
     for width in WIDTHS if gradually else ():
         found = _descended(problem, alone, problem, z, NEARLY, near, known, width=width)
@@ -200,7 +198,7 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
     Returns the fit, whose problem lacks those units, and how many there were.
     """
     if start is None:
-        start = best_valley(problem)
+        start = _led(_few(problem), np.zeros(len(problem.unknowns))).z
     found, total = _descended(problem, problem, problem, start), 0
     for _ in range(MOST_CLEANINGS):
         table = problem.table.with_values(found.residual)
@@ -234,31 +232,22 @@ def best_valley(problem: FitProblem) -> Array:
     """Return where the best of several fits to a few units of each session ends, (p,) steps.
 
     Where gaps are free by more than shims leave, a flange touches or does not: the sum of squares
-    has a minimum each, and steps do not go from one to the other.  So the fit begins again with
-    each gap on either side.
+    has a minimum each, and steps do not go from one to the other.  So the fit begins again over
+    wide differences, and with each gap on either side.
     """
     few = _few(problem)
-    sharp, wide = _begun(few, np.zeros(len(few.unknowns)))
-    found = [sharp, wide]
+    z = np.zeros(len(few.unknowns))
+    sharp = _led(few, z)
+    for width in WIDTHS:
+        z = _led(few, z, width).z
+    found = [sharp, _led(few, z)]
     for place, unknown in enumerate(few.unknowns):
         if not (unknown.parameter.linear or unknown.effect.law.smooth):
             for side in (-ELSEWHERE, ELSEWHERE):
                 start = sharp.z.copy()
                 start[place] = side
                 found.append(_led(few, np.clip(start, *few.bounds)))
-    return _best(*found).z
-
-
-def _begun(few: FitProblem, z: Array) -> tuple[BaseFit, BaseFit]:
-    """Return where steps from `z` (p,) lead, and where they do with wide differences first."""
-    sharp = _led(few, z)
-    for width in WIDTHS:
-        z = _led(few, z, width).z
-    return sharp, _led(few, z)
-
-
-def _best(*found: BaseFit) -> BaseFit:
-    return min(found, key=lambda each: each.cost)
+    return min(found, key=lambda each: each.cost).z
 
 
 def _few(problem: FitProblem) -> FitProblem:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.identification.base_fit import BaseFit, fit_cleaned
+from wrist_stiffness.identification.base_fit import BaseFit, best_valley, fit_cleaned
 from wrist_stiffness.identification.free_effects import commissioning, unfitted
 from wrist_stiffness.identification.held_out import Judge
 from wrist_stiffness.identification.likelihood import likelihood_of
@@ -119,7 +119,7 @@ def calibrate(
     problem = FitProblem(start.with_effects(*held), units, free)
     require_units(problem)
     progress(0, STEPS)
-    first, lost = fit_cleaned(problem)
+    first, lost = fit_cleaned(problem, best_valley(problem))
     progress(1, STEPS)
     judge, set_up = Judge(first), _set_up_of(first.problem, start)
     after, without = (
