@@ -2,7 +2,7 @@
 
 Each tolerance may lie within two standard deviations while all of them together cannot: a load
 scale that is far off pulls at every axis.  The most probable values of a sound wrist scatter about
-the drawing by the prior covariance less what the data leave unknown: one chi-square of all.
+the drawing by what the drawing allows, as far as the data tell it: one chi-square of all.
 """
 
 from __future__ import annotations
@@ -10,9 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.sessions.refitted import TOLERATED
 
 KNOWN = 0.1
@@ -74,16 +77,18 @@ def strain(fit: WristFit) -> Strain | None:
     weight = point.weight[at]
     z = weight * (point.z[at] + found.step[at])
     left = found.covariance[np.ix_(at, at)] * np.outer(weight, weight)
-    sizes, vectors = np.linalg.eigh(np.eye(len(at)) - left)
+    # What the data tell of a wrist and of noise: a fit holds both to its prior.
+    told = np.eye(len(at)) - left
+    scatter = told @ _as_drawn(problem, at) @ told + left - left @ left
+    sizes, vectors = np.linalg.eigh(scatter)
     known = sizes > KNOWN
     square = float(np.sum((vectors[:, known].T @ z) ** 2 / sizes[known]))
     freedom = int(np.count_nonzero(known))
     # Without its prior a tolerance would go as far as the data ask for.
-    told = np.maximum(1.0 - np.diag(left), 1e-9)
-    gains = np.where(told > KNOWN, z**2 / told, 0.0)
+    gains = np.where(np.diag(told) > KNOWN, z**2 / np.maximum(np.diag(scatter), KNOWN), 0.0)
     far = int(np.argmax(gains))
     unknown = problem.unknowns[at[far]]
-    times = float(z[far] / told[far])
+    times = float(z[far] / told[far, far])
     alone = len(at) * chdtrc(1, gains[far])
     return Strain(
         square,
@@ -94,3 +99,18 @@ def strain(fit: WristFit) -> Strain | None:
         times,
         square - float(gains[far]),
     )
+
+
+def _as_drawn(problem: FitProblem, at: NDArray[np.intp]) -> Array:
+    """Return the covariance of some unknowns over wrists within their tolerances, in steps."""
+    found = np.eye(len(at))
+    unknowns = [problem.unknowns[place] for place in at]
+    for name in {each.effect.name for each in unknowns}:
+        own = {each.key: n for n, each in enumerate(unknowns) if each.effect.name == name}
+        effect = unknowns[next(iter(own.values()))].effect
+        keys = [parameter.key for parameter in effect.parameters]
+        kept = [n for n, key in enumerate(keys) if key in own]
+        places = [own[keys[n]] for n in kept]
+        drawn = effect.law.as_drawn(problem.model.table.geometry, effect.component)
+        found[np.ix_(places, places)] = drawn[np.ix_(kept, kept)]
+    return found

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
+from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.columns import Recipe, tangents
 from wrist_stiffness.model.contribution import NOTHING, Contribution, MissingSignalError
 from wrist_stiffness.model.parameters import Parameter
@@ -163,6 +164,13 @@ class Law:
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the same of a law that remembers nothing."""
         return NOTHING
+
+    def as_drawn(self, geometry: Geometry, place: str) -> Array:
+        """Return how parameters scatter over wrists as a drawing allows them, (p, p).
+
+        A covariance in typical magnitudes, which are the limits of the drawing.
+        """
+        return np.eye(len(self.parameters(place)))
 
     def stage_at(self, place: str) -> Stage:
         """Return what the law changes at a place."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wrist_stiffness.mechanism.components import JOINTS
+from wrist_stiffness.mechanism.components import JOINTS, Array
+from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.law import Contribution, Law, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter, symmetric
 from wrist_stiffness.model.places import cross_axes
@@ -47,6 +48,16 @@ class AxisMisalignment(Law):
             *(symmetric(f"shift_{axis}_um", 5000.0, 30.0) for axis in SHIFTS[place]),
             *(symmetric(f"tilt_{axis}_mdeg", 5000.0, 50.0) for axis in TILTS[place]),
         )
+
+    def as_drawn(self, geometry: Geometry, place: str) -> Array:
+        """Return the scatter at O of bores that are drawn where they are: a tilt shifts there."""
+        shift, *_, tilt = (each.scale for each in self.parameters(place))
+        lever = geometry.bushings[place].radius * np.radians(1e-3 * tilt) / (1e-6 * shift)
+        at_o = np.eye(6)
+        at_o[1, 3], at_o[0, 4] = lever, -lever
+        felt = ["uvw".index(axis) for axis in SHIFTS[place]]
+        felt += [3 + "uvw".index(axis) for axis in TILTS[place]]
+        return (at_o @ at_o.T)[np.ix_(felt, felt)]
 
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the screw, turned with its body."""
