@@ -89,17 +89,6 @@ def test_slopes_that_lead_no_further_do_not_end_a_calibration(model, in_the_cell
     assert found.variance < 1.0
 
 
-def test_slopes_that_lead_no_further_do_not_end_a_diagnosis(model, in_the_cell):
-    """Within its tolerances this wrist was left with 7.7 times the variance of the noise."""
-    settings = CellSettings(
-        rate_hz=20.0, program_seconds=60.0, program_seed=6, base="wrong", base_seed=6
-    )
-    free, held = free_base(model)
-    units = (as_units(model, in_the_cell(model.table, settings, 1)),)
-    found, _ = fit_cleaned(FitProblem(model.with_effects(*held), units, free))
-    assert found.variance < 1.0
-
-
 @pytest.mark.slow
 def test_wide_differences_lead_past_the_pins_that_turn_over(model, in_the_cell):
     """Play of 5 um and friction: slopes lead no further than the next pin that turns over.

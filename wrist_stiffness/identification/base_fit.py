@@ -198,7 +198,7 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
     Returns the fit, whose problem lacks those units, and how many there were.
     """
     if start is None:
-        start = best_valley(problem, NEARLY)
+        start = _led(_few(problem), np.zeros(len(problem.unknowns))).z
     found, total = _descended(problem, problem, problem, start), 0
     for _ in range(MOST_CLEANINGS):
         table = problem.table.with_values(found.residual)
@@ -228,30 +228,26 @@ def without_units(sessions: tuple[UnitSession, ...], aside: Mask) -> tuple[UnitS
     return tuple(parts)
 
 
-def best_valley(problem: FitProblem, by: float = 0.0) -> Array:
+def best_valley(problem: FitProblem) -> Array:
     """Return where the best of several fits to a few units of each session ends, (p,) steps.
 
     Where gaps are free by more than shims leave, a flange touches or does not: the sum of squares
     has a minimum each, and steps do not go from one to the other.  So the fit begins again over
     wide differences, and with each gap on either side.
-
-    `by`: share by which another one must be better than where slopes lead from the means: all end
-    nearly, and by less they do not differ.
     """
     few = _few(problem)
     z = np.zeros(len(few.unknowns))
     sharp = _led(few, z)
     for width in WIDTHS:
         z = _led(few, z, width).z
-    found = [_led(few, z)]
+    found = [sharp, _led(few, z)]
     for place, unknown in enumerate(few.unknowns):
         if not (unknown.parameter.linear or unknown.effect.law.smooth):
             for side in (-ELSEWHERE, ELSEWHERE):
                 start = sharp.z.copy()
                 start[place] = side
                 found.append(_led(few, np.clip(start, *few.bounds)))
-    best = min(found, key=lambda each: each.cost)
-    return (best if best.cost < (1.0 - by) * sharp.cost else sharp).z
+    return min(found, key=lambda each: each.cost).z
 
 
 def _few(problem: FitProblem) -> FitProblem:
