@@ -41,13 +41,15 @@ def test_a_wrist_within_its_tolerances_is_not_strained(model, day):
     assert found.square < 2.0 * found.freedom
 
 
-@pytest.mark.parametrize("seed", [16, 18])
+@pytest.mark.parametrize("seed", [10, 20])
 def test_bores_that_are_tilted_where_they_are_are_within_their_tolerances(model, in_the_cell, seed):
-    """A tilt at a bushing moves the axis at O: of 40 sound wrists 7 were called strained."""
+    """A tilt at a bushing moves the axis at O; without that these have chances of 1 and 3 %."""
     settings = CellSettings(
         rate_hz=20.0, program_seconds=60.0, program_seed=seed, base="wrong", base_seed=seed
     )
-    assert strained(model, in_the_cell(model.table, settings, 1)).sentence == ""
+    found = strained(model, in_the_cell(model.table, settings, 1))
+    assert found.sentence == ""
+    assert found.chance > 0.1
 
 
 def test_parts_that_are_each_a_little_soft_are_too_much_together(model, day):
