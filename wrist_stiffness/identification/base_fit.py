@@ -233,14 +233,15 @@ def best_valley(problem: FitProblem) -> Array:
 
     Where gaps are free by more than shims leave, a flange touches or does not: the sum of squares
     has a minimum each, and steps do not go from one to the other.  So the fit begins again over
-    wide differences, and with each gap on either side.
+    wide differences, where a wrist within its tolerances would be, and with each gap on either
+    side.
     """
     few = _few(problem)
     z = np.zeros(len(few.unknowns))
     sharp = _led(few, z)
     for width in WIDTHS:
         z = _led(few, z, width).z
-    found = [sharp, _led(few, z)]
+    found = [sharp, _led(few, z), _led(few, _as_drawn(few))]
     for place, unknown in enumerate(few.unknowns):
         if not (unknown.parameter.linear or unknown.effect.law.smooth):
             for side in (-ELSEWHERE, ELSEWHERE):
@@ -248,6 +249,14 @@ def best_valley(problem: FitProblem) -> Array:
                 start[place] = side
                 found.append(_led(few, np.clip(start, *few.bounds)))
     return min(found, key=lambda each: each.cost).z
+
+
+def _as_drawn(problem: FitProblem) -> Array:
+    """Return where a fit ends that holds the wrist within its tolerances, (p,) steps."""
+    tight = replace(problem, free=within_tolerances(problem.free))
+    found = _led(tight, np.zeros(len(tight.unknowns))).z
+    ratio = [t.step / own.step for t, own in zip(tight.unknowns, problem.unknowns, strict=True)]
+    return found * ratio
 
 
 def _few(problem: FitProblem) -> FitProblem:
