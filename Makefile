@@ -6,7 +6,8 @@ VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2
 READY = $(VENV)/.ready-$(VERSION)
 OTHER = $(filter-out $(READY),$(wildcard $(VENV)/.ready-*))
 RUN = $(VENV)/bin/python -m
-TESTERS := $(shell nproc 2>/dev/null || echo 2)
+# One more than there are cores: live nodes mostly wait.
+TESTERS := $(shell echo $$(( $$(nproc 2>/dev/null || echo 2) + 1 )))
 
 # ROS nodes of this run neither hear nor disturb those of other machines or other runs.
 export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST

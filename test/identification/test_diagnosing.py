@@ -64,6 +64,17 @@ def test_a_wrong_base_alone_is_no_missing_effect(model, in_the_cell):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [4, 6, 18])
+def test_a_sound_wrist_whose_fit_stops_at_a_kink_misses_nothing(model, in_the_cell, seed):
+    """Of the seeds 1 to 24 these three: slopes from the means end at 3 to 6 times the noise."""
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=60.0, program_seed=seed, base="wrong", base_seed=seed
+    )
+    session = in_the_cell(model.table, settings, 1)
+    assert not WristProblem(model, (as_units(model, session),)).begin().rough
+
+
+@pytest.mark.slow
 def test_backlash_behind_a_wrong_base_is_named_with_its_width(worn):
     _, found = worn
     (finding,) = found.diagnosis.findings

@@ -12,6 +12,7 @@ from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.identification.base_fit import (
     Base,
     BaseFit,
+    best_valley,
     fit_base,
     fit_cleaned,
     free_base,
@@ -62,9 +63,13 @@ class WristProblem:
     ) -> None:
         self._model, self._base = model, base or free_base(model)
         free, held = self._base
-        first, lost = fit_cleaned(FitProblem(model.with_effects(*held), sessions, free))
-        self._sessions, self.table = first.problem.sessions, likelihood_of(first, lost)
-        self._first = WristFit(first, self.table)
+        problem = FitProblem(model.with_effects(*held), sessions, free)
+        first = _cleaned(problem)
+        if first.rough:
+            # Something is missing only if no valley leads to the noise.
+            again = _cleaned(problem, best_valley(problem))
+            first = first if again.rough else again
+        self._first, self.table, self._sessions = first, first.table, first.problem.sessions
         self._extended: tuple[WristFit, Effect, WristFit] | None = None
         self._near: dict[WristCandidate, WristFit] = {}
         self._asked: tuple[BaseFit, dict[str, WristCandidate]] | None = None
@@ -215,6 +220,11 @@ class WristProblem:
             )
             models.append(replace(own, effects=beside))
         return WristPoint(tuple(models))
+
+
+def _cleaned(problem: FitProblem, start: Array | None = None) -> WristFit:
+    base, lost = fit_cleaned(problem, start)
+    return WristFit(base, likelihood_of(base, lost))
 
 
 def _plays(effect: Effect) -> list[dict[str, float]]:
