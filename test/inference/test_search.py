@@ -274,6 +274,22 @@ def test_in_place_of_an_effect_only_what_may_regain_half_of_it_is_asked(rng):
     assert beside_second == {"rival@place"}
 
 
+def test_a_first_answer_is_told_while_the_search_goes_on(rng):
+    problem, heard = Disappointing(rng, 1.0), []
+    search = Search(problem, tell=heard.append, most_effects=1)
+    search.run()
+    (name,) = search.best.names
+    assert heard[1].startswith("missing so far: nothing; asking")
+    assert heard[-1].startswith(f"missing so far: {name}; ")
+    # Something outside the catalogue.
+    pose = 5.0 * problem.whole[name]
+    problem.background = Background((Group("pose", "s", pose),), 0.2)
+    problem.left, problem.slopes = problem.left + pose[:, 0], {}
+    heard.clear()
+    Search(problem, tell=heard.append).run()
+    assert heard[-1].startswith("missing so far: something; ")
+
+
 @pytest.mark.parametrize(
     ("seconds", "fits", "ended"), [(0.0, 48, TIME_OVER), (np.inf, 1, MANY_FITS), (np.inf, 48, "")]
 )

@@ -8,7 +8,7 @@ answer.  Which of the candidates are worth a fit, their slopes tell, and then a 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -136,7 +136,7 @@ class Search:
     seconds : float, optional
         Time after which no further fit is begun.
     tell : callable, optional
-        Told what is being done.
+        Told what is missing so far, and what is being done.
     most_effects : int, optional
         Most effects of a set.
     costly : bool, optional
@@ -256,7 +256,7 @@ class Search:
 
         `instead_of`: the set of which one effect was dropped.
         """
-        self._tell(f"asking every candidate{_beside(state.names)}")
+        self._say("asking every candidate")
         trials = self._problem.trials(state.fit)
         self._catalogue = max(self._catalogue, len(trials) + len(state.names))
         as_noise = ranked(state.evidence.without_discrepancy(), trials)
@@ -291,7 +291,7 @@ class Search:
                     self.ended = self.ended or MANY_FITS
                     break
                 self._fits += 1
-                self._tell(f"fitting {name}{_beside(state.names)}")
+                self._say(f"fitting {name}")
                 fit = self._problem.added(state.fit, each)
                 if fit is None:
                     logs[name] = -np.inf
@@ -371,6 +371,11 @@ class Search:
             found.append((log, each))
         return sorted(found, key=lambda pair: -pair[0])
 
+    def _say(self, doing: str) -> None:
+        """Tell a first answer beside what is being done."""
+        missing = sorted(self.best.names) or ["something" if self.base.rough else "nothing"]
+        self._tell(f"missing so far: {', '.join(missing)}; {doing}")
+
     def _over(self) -> bool:
         """Tell whether the time is over; then the search says so."""
         if time.monotonic() > self._end:
@@ -389,7 +394,7 @@ class Search:
 
     def _less(self, state: State, name: str) -> State:
         """Return the set with one effect less, fitted from where this one ended."""
-        self._tell(f"fitting without {name}")
+        self._say(f"fitting without {name}")
         return self._known(self._problem.without(state.fit, name), state)
 
     def _known(self, fit: Any, near: State | None) -> State:
@@ -420,10 +425,6 @@ class Search:
             best = int(np.argmax(logs))
             fit, found = trials[best], known[best]
         return fit, found
-
-
-def _beside(names: Collection[str]) -> str:
-    return f" beside {', '.join(sorted(names))}" if names else ""
 
 
 def _one_of_each_law(ranking: Sequence[Ranked], but: Sequence[Ranked]) -> list[Ranked]:
