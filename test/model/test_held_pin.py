@@ -134,6 +134,56 @@ def test_two_joints_hold_a_pin_in_a_stream_as_in_a_recording(model, make):
         assert np.all(np.abs(found.twist - wanted) <= 1e-11 * np.abs(at_once).max(axis=0))
 
 
+def rubbing_load():
+    """Four seconds: the load turns, both motors move and then rest."""
+    time = 0.1 * np.arange(40.0)
+    theta = np.radians(15.0) * np.stack([np.sin(time), np.cos(1.3 * time)], axis=1)
+    theta[20:] = theta[20]
+    load = np.stack([np.sin(3 * time), np.cos(2 * time), np.sin(4 * time), *np.zeros((3, 40))], 1)
+    return Block(time, theta, load)
+
+
+def true_twist(model, block, *laws):
+    """What the virtual cell says, which shares no formula with the model."""
+    state = TrueWrist(model.table, laws).run(block.time, block.theta, block.load, np.zeros(40))
+    return state.equilibrium.twist
+
+
+@pytest.mark.parametrize("joints", ["2", "3", "4", "23", "234"])
+def test_friction_alone_is_the_truth_to_a_fiftieth(model, make, joints):
+    """Flanges give way to what rubs, and one joint that rubs to another."""
+    block, geometry = rubbing_load(), model.table.geometry
+    told, laws = [], []
+    for joint in (f"joint_{number}" for number in joints):
+        numbers = {"coefficient": 0.15, "preload_N": 0.2, "presliding_um": 0.01}
+        told.append(make.effect(f"joint_friction@{joint}", **numbers, bristle_um_per_N=50.0))
+        laws.append(JointFriction(joint, Seat.of(geometry, joint), 0.15, 0.03, 2e4, 0.0))
+    true = true_twist(model, block, *laws) - true_twist(model, block)
+    found = model.with_effects(*told).batch(block).twist - model.batch(block).twist
+    for part in (slice(0, 3), slice(3, 6)):
+        off = np.linalg.norm((found - true)[:, part])
+        assert off < 0.02 * np.linalg.norm(true[:, part])
+
+
+@pytest.mark.parametrize("joints", ["4", "23"])
+def test_no_play_at_all_leaves_friction_as_it_is(model, make, joints):
+    """A search would else find play wherever friction is not what it should be."""
+    friction = [
+        make.effect(
+            f"joint_friction@joint_{number}", coefficient=0.15, preload_N=0.2, bristle_um_per_N=50.0
+        )
+        for number in joints
+    ]
+    none = make.effect("joint_clearance@joint_1", clearance_um=1e-5)
+    block = rubbing_load()
+    bare, alone, beside = (
+        model.with_effects(*each).batch(block).twist for each in ((), friction, [*friction, none])
+    )
+    for part in (slice(0, 3), slice(3, 6)):
+        off = np.linalg.norm((beside - alone)[:, part])
+        assert off < 0.02 * np.linalg.norm((alone - bare)[:, part])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("loose", "clearance_um", "joint", "coefficient"),
@@ -143,11 +193,7 @@ def test_play_beside_friction_is_nearly_the_truth(
     model, make, loose, clearance_um, joint, coefficient
 ):
     """With true values; what one does to the other is told to a fifth."""
-    stiffness, time = 2e4, 0.1 * np.arange(40.0)
-    theta = np.radians(15.0) * np.stack([np.sin(time), np.cos(1.3 * time)], axis=1)
-    theta[20:] = theta[20]
-    load = np.stack([np.sin(3 * time), np.cos(2 * time), np.sin(4 * time), *np.zeros((3, 40))], 1)
-    block = Block(time, theta, load)
+    stiffness, block = 2e4, rubbing_load()
     known = {
         "play": make.effect(f"joint_clearance@{loose}", clearance_um=clearance_um),
         "friction": make.effect(
@@ -169,9 +215,7 @@ def test_play_beside_friction_is_nearly_the_truth(
                 joint, Seat.of(geometry, joint), coefficient, 0.2 * coefficient, stiffness, 0.0
             ),
         }
-        wrist = TrueWrist(model.table, [laws[name] for name in names])
-        state = wrist.run(block.time, block.theta, block.load, np.zeros(len(block)))
-        return state.equilibrium.twist
+        return true_twist(model, block, *(laws[name] for name in names))
 
     def told(*names):
         return model.with_effects(*(known[name] for name in names)).batch(block).twist

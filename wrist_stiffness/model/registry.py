@@ -118,6 +118,8 @@ def law_of(found: object, place: str) -> Law:
         raise InputError(
             f"{place}: stage {law.stage!r} of {found.__name__} is not one of {', '.join(STAGES)}"
         )
+    if law.stage == "friction" and law.state_is_a_guess:
+        raise InputError(f"{place}: the state of {found.__name__}, a friction, cannot be a guess")
     _require_parameters(law, place)
     return law
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import repeat
+from typing import Any
 
 import numpy as np
 
@@ -50,9 +53,10 @@ class Rubbing:
         pressed = pressing(geometry, joint, at.at_home(joint, at.through_place(joint)))
         budget = self.coefficient * (pressed + self.preload) + LEAST_BUDGET
         bristle = self.presliding / budget + self.bristle
-        slide, turn = at.slide_flexibility(joint)
+        place = PASSIVE_JOINTS.index(joint)
+        slide, turn = (each[:, place] for each in at.statics.slide_flexibility)
         own = np.broadcast_to(self.force, (len(at.block), 2))[:, 1]
-        slid = at.slides[:, PASSIVE_JOINTS.index(joint)] + slide * own
+        slid = at.slides[:, place] + slide * own
         return Bristles(
             np.stack([radius * at.turn(joint), slid], axis=1),
             np.stack([bristle + radius**2 * turn, bristle + slide], axis=1),
@@ -92,14 +96,17 @@ def slip(bristles: Bristles, foot: Array, give: Array | None = None) -> tuple[Ar
     force, feet = np.empty((n, 2)), np.empty((n + 1, 2))
     x, y = float(foot[0]), float(foot[1])
     feet[0] = x, y
-    soft = bristles.compliance[:, :, None] * np.eye(2)
-    # Along the principal axes a slip adds the same to both compliances.
-    compliance, axes = np.linalg.eigh(soft if give is None else soft + give)
+    compliance = bristles.compliance
+    axes: Iterable[Any] = repeat(((1.0, 0.0), (0.0, 1.0)), n)
+    if give is not None:
+        # Along the principal axes a slip adds the same to both compliances.
+        compliance, turned = np.linalg.eigh(compliance[:, :, None] * np.eye(2) + give)
+        axes = turned.tolist()
     # Plain numbers: the history goes sample by sample, and arrays of two are slow.
     rows = zip(
         bristles.moved.tolist(),
         compliance.tolist(),
-        axes.tolist(),
+        axes,
         bristles.budget.tolist(),
         strict=True,
     )

@@ -122,6 +122,17 @@ class BlockStatics:
         )
 
     @cached_property
+    def slide_flexibility(self) -> tuple[Array, Array]:
+        """How far joint_2 to joint_4 slide, and turn, for a unit force, and torque, along the axis.
+
+        Gives `slide` (n, 3): [m/N]; with all flanges open, and `turn` (n, 3): [rad/(N m)].
+        """
+        rows, flexibility = self.influence.slides(), self.turned_flexibility
+        parts = flexibility[..., :3, :3], flexibility[..., 3:, 3:]
+        slide, turn = ((rows @ part * rows).sum(axis=(1, 3)) for part in parts)
+        return slide, turn
+
+    @cached_property
     def told(self) -> tuple[Array, Array]:
         """Twist and gaps under the told load and own weight alone, slides free, (n, 6), (n, m)."""
         column, operators = self.load[..., None], self.operators
@@ -400,17 +411,6 @@ class Situation:
         """
         force = forces_of(self.operators.approach, gap, closed)
         return twist + (self.operators.force_twist @ force[..., None])[..., 0]
-
-    def slide_flexibility(self, joint: str) -> tuple[Array, Array]:
-        """Return how far a joint slides, and turns, for a unit force, and torque, along its axis.
-
-        Gives `slide` (n,): [m/N]; with all flanges open, and `turn` (n,): [rad/(N m)].
-        """
-        row = self.influence.slides()[..., PASSIVE_JOINTS.index(joint), :]
-        flexibility = self.statics.turned_flexibility
-        slide = np.einsum("nki,nkij,nkj->n", row, flexibility[..., :3, :3], row)
-        turn = np.einsum("nki,nkij,nkj->n", row, flexibility[..., 3:, 3:], row)
-        return slide, turn
 
     def joint_push(self, joint: str, force: Array, torque: Array) -> Contribution:
         """Return a force (n,) [N] and torque (n,) [N m] of a passive joint on its platform side.

@@ -20,7 +20,8 @@ class JointFriction(Law):
     surfaces do whose contacts grow with the load (Greenwood and Williamson), and by so much a
     newton, as a lining does and the bristles of Dahl and LuGre of one stiffness; the force
     never exceeds coefficient times (pressing forces + preload).  While the joint turns the budget
-    is spent there and the slide is free; at rest it locks.
+    is spent there and the slide is free; at rest it locks.  In the situation that it gets its own
+    force acts already, as in the pass before: see `evaluation.PASSES`.
     """
 
     id = "joint_friction"
@@ -44,6 +45,8 @@ class JointFriction(Law):
     def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the friction force and torque; the state is the bristle's foot."""
         rubbing = Rubbing(place, *(values[each.key] for each in self.own))
+        own = sum(each.force for each in at.given.rubbing or () if each.joint == place)
+        rubbing = replace(rubbing, force=own)
         bristles = rubbing.bristles(at)
         force, feet = slip(bristles, bristles.moved[0] if state is None else state)
         push = rubbing.push(at, force)
