@@ -50,8 +50,8 @@ FIRST_ORDER_LIMIT = 2e-3
 
 SAMPLE_STAGES, RUBS = STAGES[1:], STAGES[3]
 
-PASSES = 4
-"""In which joints that rub and the flanges find each other: of two and three joints they leave 1 %
+PASSES = 3
+"""In which joints that rub and the flanges find each other: they leave 1 %, of three joints 3 %
 (`pytest test/model/test_held_pin.py -k friction_alone`).  Each pass has a history of its own, so
 any blocks give the same."""
 
@@ -317,20 +317,20 @@ def _settled(
     same = [each for each in known if each is not None]
     if like is not None and len(same) == len(effects) == len(like.added(RUBS)):
         return same
-    found: list[Advanced] = []
+    found: dict[int, Advanced] = {}
+    pushes: dict[int, Contribution] = {}
     ends: list[tuple[Any, ...]] = [() for _ in effects]
     for number in range(PASSES):
-        pushes = [each.added for each in found]
-        found = []
         for n, (effect, state) in enumerate(zip(effects, states, strict=True)):
-            acting = (each for m, each in enumerate(pushes) if m != n or each.rubbing)
+            acting = (each for m, each in pushes.items() if m != n or each.rubbing)
             here = at.with_more(sum(acting, NOTHING))
             before = None if state is None else state[number]
-            found.append(_advanced(effect, here, before, None, NO_GUESSES))
+            found[n] = _advanced(effect, here, before, None, NO_GUESSES)
+            pushes[n] = found[n].added
             ends[n] += (found[n].left,)
     return [
         replace(each, at=at, before=state, after=end)
-        for each, state, end in zip(found, states, ends, strict=True)
+        for each, state, end in zip(found.values(), states, ends, strict=True)
     ]
 
 

@@ -293,6 +293,8 @@ class Situation:
 
     def with_more(self, added: Contribution) -> Situation:
         """Return the situation after a further stage that added this, with what is known of it."""
+        if added is NOTHING:
+            return self
         known, guess = vars(self), self.guess
         if "contact" in known:
             guess = self.contact[1]
