@@ -44,7 +44,9 @@ class Law:
     id : str
         Name in the model file.
     stage : str
-        What it changes, one of `STAGES`.
+        What it changes, one of `STAGES`.  Laws of `friction` are asked several times for a block,
+        each time beside what all of them added the last time, and with a state of its own; one that
+        adds `rubbing` finds its own force acting, any other one does not.
     places : tuple of str
         Components where it may be.
     sentence : str
