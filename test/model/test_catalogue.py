@@ -1,5 +1,7 @@
 """Every law of the catalogue speaks to a technician, in units that its names tell."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,29 @@ def test_every_law_speaks_to_a_technician_and_has_sane_parameters(law):
             assert si_factor(p.key) > 0.0
     assert len(law.check) > 20
     assert len(law.excited_by) > 10
+
+
+@pytest.mark.parametrize("law", catalogue().values(), ids=lambda law: law.id)
+def test_next_to_no_effect_adds_next_to_nothing(model, make, law):
+    """Nor beside joints that rub and a pin in its play: a search would else find it there."""
+    rubs = {"coefficient": 0.15, "preload_N": 0.2, "bristle_um_per_N": 50.0}
+    worn = [make.effect(f"joint_friction@{joint}", **rubs) for joint in ("joint_2", "joint_4")]
+    worn.append(make.effect("joint_clearance@joint_1", clearance_um=5.0))
+    block = make.block(20)
+    for beside, place in product((worn[:2], worn), law.places):
+        own = law.parameters(place)
+        if f"{law.id}@{place}" in {each.name for each in beside} or own[0].mean:
+            continue
+        bare = model.with_effects(*beside).batch(block).measured
+        little, usual = (
+            model.with_effects(*beside, make.effect(f"{law.id}@{place}", **sizes)).batch(block)
+            for sizes in ({p.key: p.mean or size * p.scale for p in own} for size in (1e-5, 1.0))
+        )
+        for part in (slice(0, 3), slice(3, 6)):
+            off, size = (
+                np.linalg.norm((each.measured - bare)[:, part]) for each in (little, usual)
+            )
+            assert off <= 1e-2 * size + 1e-14
 
 
 CATALOGUE = """

@@ -165,25 +165,6 @@ def test_friction_alone_is_the_truth_to_a_fiftieth(model, make, joints):
         assert off < 0.02 * np.linalg.norm(true[:, part])
 
 
-@pytest.mark.parametrize("joints", ["4", "23"])
-def test_no_play_at_all_leaves_friction_as_it_is(model, make, joints):
-    """A search would else find play wherever friction is not what it should be."""
-    friction = [
-        make.effect(
-            f"joint_friction@joint_{number}", coefficient=0.15, preload_N=0.2, bristle_um_per_N=50.0
-        )
-        for number in joints
-    ]
-    none = make.effect("joint_clearance@joint_1", clearance_um=1e-5)
-    block = rubbing_load()
-    bare, alone, beside = (
-        model.with_effects(*each).batch(block).twist for each in ((), friction, [*friction, none])
-    )
-    for part in (slice(0, 3), slice(3, 6)):
-        off = np.linalg.norm((beside - alone)[:, part])
-        assert off < 0.02 * np.linalg.norm((alone - bare)[:, part])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("loose", "clearance_um", "joint", "coefficient"),
