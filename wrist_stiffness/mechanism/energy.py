@@ -11,7 +11,7 @@ from wrist_stiffness.mechanism.statics import (
     component_rotations,
     turned_flexibilities,
 )
-from wrist_stiffness.mechanism.vectors import block_diagonal, both_halves
+from wrist_stiffness.mechanism.vectors import both_halves
 
 
 def component_wrenches(
@@ -62,7 +62,8 @@ def flange_screws(
     configuration: Configuration, components: ElasticComponents, force: Array
 ) -> Array:
     """Return what pressed flanges (..., m) [N] add to the screws of their bushings, (..., 8, 6)."""
-    return _pressed(_sector_screws(configuration, components, force), components)
+    home = _pressed(force[..., None] * components.sectors.screw, components)
+    return both_halves(component_rotations(configuration), home)
 
 
 def strain_energies(
@@ -80,20 +81,11 @@ def strain_energies(
     flexibility = turned_flexibilities(configuration, components)
     energy: Array = 0.5 * np.einsum("...ki,...kij,...kj->...k", through, flexibility, through)
     sectors = components.sectors
-    bent = _sector_screws(configuration, components, force)
+    home = force[..., None] * sectors.screw
+    bent = both_halves(component_rotations(configuration).take(sectors.component, axis=-3), home)
     own = np.einsum("...mi,...mi->...m", through.take(sectors.component, axis=-2), bent)
     own += 0.5 * force * (force @ sectors.approach)
     return energy + _pressed(own[..., None], components)[..., 0]
-
-
-def _sector_screws(
-    configuration: Configuration, components: ElasticComponents, force: Array
-) -> Array:
-    """Screw of the bushing by each sector's contact force, (..., m, 6)."""
-    sectors = components.sectors
-    turn = block_diagonal(component_rotations(configuration).take(sectors.component, axis=-3))
-    bent: Array = np.einsum("...mij,mj,...m->...mi", turn, sectors.screw, force)
-    return bent
 
 
 def _pressed(by_sector: Array, components: ElasticComponents) -> Array:

@@ -77,6 +77,12 @@ class Influence:
         """Slides of joint_2 to joint_4 (rows) by a translation of a component, (..., 8, 3, 3)."""
         return _SLIDE_SIGN * self.slides_limb_1[..., None, :, :]
 
+    def slid(self, moved: Array) -> Array:
+        """Slides of joint_2 to joint_4 for translations (..., 8, 3) of the components, (..., 3)."""
+        relative = _SLIDE_SIGN[:, 0, 0] @ moved
+        slides: Array = (self.slides_limb_1 @ relative[..., None])[..., 0]
+        return slides
+
     def of_frames(self) -> tuple[Array, Array]:
         """Motion of both interface frames of each component for a screw at each component.
 

@@ -96,7 +96,7 @@ def platform_twist(projectors: Influence, screws: Array) -> Array:
 
 def slides(projectors: Influence, screws: Array) -> Array:
     """Slides of joint_2 to joint_4 for `screws` (..., 8, 6) at the components, (..., 3) [m]."""
-    return np.einsum("...kij,...kj->...i", projectors.slides(), screws[..., :3])
+    return projectors.slid(screws[..., :3])
 
 
 def _to_body(rotation: Array, vector: Array) -> Array:

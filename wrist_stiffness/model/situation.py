@@ -127,9 +127,9 @@ class BlockStatics:
 
         Gives `slide` (n, 3): [m/N]; with all flanges open, and `turn` (n, 3): [rad/(N m)].
         """
-        rows, flexibility = self.influence.slides(), self.turned_flexibility
-        parts = flexibility[..., :3, :3], flexibility[..., 3:, 3:]
-        slide, turn = ((rows @ part * rows).sum(axis=(1, 3)) for part in parts)
+        rows, flexibility = self.influence.slides_limb_1, self.turned_flexibility.sum(axis=1)
+        parts = flexibility[:, :3, :3], flexibility[:, 3:, 3:]
+        slide, turn = ((rows @ part * rows).sum(axis=2) for part in parts)
         return slide, turn
 
     @cached_property
