@@ -8,7 +8,9 @@ from hypothesis.extra.numpy import arrays
 
 from wrist_stiffness.model import batch, pin_rest
 from wrist_stiffness.model.block import Block, Load, Sample
+from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS
 from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.rubbing import Bristles, dragged, slip
@@ -163,6 +165,40 @@ def test_friction_alone_is_the_truth_to_a_fiftieth(model, make, joints):
     for part in (slice(0, 3), slice(3, 6)):
         off = np.linalg.norm((found - true)[:, part])
         assert off < 0.02 * np.linalg.norm(true[:, part])
+
+
+class Stick(Law):
+    """A user's own: holds back a slide as a spring does, and tells nothing of what rubs."""
+
+    id = "stick"
+    stage = "friction"
+    places = ("joint_3",)
+    own = ()
+
+    def __init__(self):
+        self.seen = []
+
+    def advance(self, at, place, values, state):
+        self.seen.append(at.slides[:, 1])
+        force = -1e3 * at.slides[:, 1]
+        return at.joint_push(place, force, 0.0 * force), None
+
+
+def test_friction_of_ones_own_sees_what_others_do_but_not_its_own_force(model, make):
+    """So a law that knows nothing of passes says in each of them what it says alone."""
+    block = rubbing_load()
+
+    def seen(*others):
+        law = Stick()
+        model.with_effects(*others, Effect(law, "joint_3")).batch(block)
+        return law.seen
+
+    bare = evaluate(model, block, None).situation.slides[:, 1]
+    assert all(np.array_equal(each, bare) for each in seen())
+    beside = seen(make.effect("joint_friction@joint_4", coefficient=0.15, preload_N=0.2))
+    assert np.linalg.norm(beside[0] - bare) > 1e-3 * np.linalg.norm(bare)
+    # The other one has found its rest beside it.
+    assert np.linalg.norm(beside[-1] - beside[-2]) < 0.1 * np.linalg.norm(beside[-1] - bare)
 
 
 @pytest.mark.slow

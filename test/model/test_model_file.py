@@ -280,6 +280,10 @@ LINEARISED = """def linearised(self, place, signals):
             OWN.replace("    stage =", "    inexactness = 3\n    stage ="),
             "inexactness = 3 is not from 0",
         ),
+        (
+            OWN.replace('stage = "geometry"', 'stage = "friction"\n    state_is_a_guess = True'),
+            "the state of Twist, a friction, cannot be a guess",
+        ),
     ],
 )
 def test_bad_law_files_give_one_line(tmp_path, own, text):
