@@ -99,12 +99,15 @@ def test_a_held_pin_is_in_balance(model, make, monkeypatch, loose, joint):
     assert np.allclose(force, wall, atol=1e-4)
 
 
-def test_a_pin_begins_where_another_model_rested_but_has_its_own_past(model, make, monkeypatch):
+@pytest.mark.parametrize("loose", ["1", "14"])
+def test_pins_begin_where_another_model_rested_but_have_their_own_past(
+    model, make, monkeypatch, loose
+):
     """Bristles stand where they were dragged by this model's friction, not by the other one's."""
     monkeypatch.setattr(batch, "CHUNK", 10)
-    play = make.effect("joint_clearance@joint_1", clearance_um=5.0)
+    play = [make.effect(f"joint_clearance@joint_{each}", clearance_um=5.0) for each in loose]
     little, much = (
-        (make.effect("joint_friction@joint_3", coefficient=size, preload_N=0.5), play)
+        (make.effect("joint_friction@joint_3", coefficient=size, preload_N=0.5), *play)
         for size in (0.02, 0.3)
     )
     block = make.block(40)
@@ -114,13 +117,16 @@ def test_a_pin_begins_where_another_model_rested_but_has_its_own_past(model, mak
     assert np.all(np.abs(beside.twist - alone.twist) <= 1e-9 * scale)
 
 
-def test_two_joints_hold_a_pin_in_a_stream_as_in_a_recording(model, make):
+@pytest.mark.parametrize("loose", ["1", "12"])
+def test_two_joints_hold_pins_in_a_stream_as_in_a_recording(model, make, loose):
     """The passes have histories of their own, so samples one by one are the same."""
     effects = [
         make.effect(f"joint_friction@{joint}", coefficient=0.2, preload_N=0.5)
         for joint in ("joint_3", "joint_4")
     ]
-    loaded = model.with_effects(*effects, make.effect("joint_clearance@joint_1", clearance_um=5.0))
+    for joint in loose:
+        effects.append(make.effect(f"joint_clearance@joint_{joint}", clearance_um=5.0))
+    loaded = model.with_effects(*effects)
     block = make.block(40)
     at_once, session = loaded.batch(block).twist, loaded.session()
     for row, wanted in enumerate(at_once):
@@ -165,6 +171,33 @@ def test_friction_alone_is_the_truth_to_a_fiftieth(model, make, joints):
     for part in (slice(0, 3), slice(3, 6)):
         off = np.linalg.norm((found - true)[:, part])
         assert off < 0.02 * np.linalg.norm(true[:, part])
+
+
+@pytest.mark.parametrize("joints", ["23", "14", "34", "234", "12345"])
+@pytest.mark.parametrize("clearance_um", [2.0, 20.0])
+def test_pins_rest_together_as_in_truth(model, make, joints, clearance_um):
+    """Each alone, not knowing of the others, they would be 10 to 70 % off."""
+    block, geometry = rubbing_load(), model.table.geometry
+    places = [f"joint_{number}" for number in joints]
+    laws = [
+        play(place, Seat.of(geometry, place), 1e-6 * clearance_um, SMALL_FORCE, "algebraic")
+        for place in places
+    ]
+    told = [make.effect(f"joint_clearance@{place}", clearance_um=clearance_um) for place in places]
+    true = true_twist(model, block, *laws) - true_twist(model, block)
+    found = model.with_effects(*told).batch(block).twist - model.batch(block).twist
+    for part in (slice(0, 3), slice(3, 6)):
+        off = np.linalg.norm((found - true)[:, part])
+        assert off < 0.01 * np.linalg.norm(true[:, part])
+
+
+def test_a_second_pin_moves_the_first_also_beside_a_model_that_has_one(model, make):
+    one, two = (make.effect(f"joint_clearance@joint_{n}", clearance_um=20.0) for n in "14")
+    alone, both = model.batch_with(rubbing_load(), [(one,), (one, two)])
+    wanted = model.with_effects(one, two).batch(rubbing_load()).twist
+    assert np.abs(both.twist - wanted).max() < 1e-9 * np.abs(wanted).max()
+    again = model.batch_with(rubbing_load(), [(one, two), (one,)])[1]
+    assert np.abs(again.twist - alone.twist).max() < 1e-9 * np.abs(wanted).max()
 
 
 class Stick(Law):

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import repeat
 from operator import is_
 from pathlib import Path
 from traceback import extract_tb
@@ -274,12 +273,55 @@ def _staged(
         if stage == RUBS and effects:
             found = _settled(effects, at, before, like)
         else:
-            found = [_advanced(*each, like, near) for each in zip(effects, repeat(at), before)]
+            found = _beside(effects, at, before, like, near)
         for n, each in zip(places, found, strict=True):
             advanced[n] = each
             warnings += each.warnings
         situations.append(_after(at, [each.added for each in found], like, number))
     return Evaluated(tuple(situations), tuple(advanced), tuple(warnings))
+
+
+def _beside(
+    effects: Sequence[Effect],
+    at: Situation,
+    states: Sequence[Any],
+    like: Evaluated | None,
+    near: Guesses,
+) -> list[Advanced]:
+    """Return what effects do that see the same; those that rest together do it together."""
+    one = [n for n, each in enumerate(effects) if _rests_together(each)]
+    rest = iter(_together([effects[n] for n in one], at, [states[n] for n in one], like, near))
+    return [
+        next(rest) if n in one else _advanced(effect, at, state, like, near)
+        for n, (effect, state) in enumerate(zip(effects, states, strict=True))
+    ]
+
+
+def _rests_together(effect: Effect) -> bool:
+    return effect.law.rests_together and not effect.law.foreign
+
+
+def _together(
+    effects: Sequence[Effect],
+    at: Situation,
+    states: Sequence[Any],
+    like: Evaluated | None,
+    near: Guesses,
+) -> list[Advanced]:
+    if not effects:
+        return []
+    known = [_known(e, at, s, like) for e, s in zip(effects, states, strict=True)]
+    same = [each for each in known if each is not None]
+    others = [] if like is None else like.known.values()
+    if len(same) == len(effects) == sum(_rests_together(each.effect) for each in others):
+        return same
+    before = [_near(*each, near) for each in zip(effects, states, strict=True)]
+    places, values = [each.component for each in effects], [each.si for each in effects]
+    found = effects[0].law.together(at, places, values, before)
+    return [
+        Advanced(effect, at, state, added, after, _first_order(effect, added))
+        for effect, state, (added, after) in zip(effects, states, found, strict=True)
+    ]
 
 
 def _advanced(
@@ -288,15 +330,19 @@ def _advanced(
     known = _known(effect, at, state, like)
     if known is not None:
         return known
-    guess = near.get(effect.name)
     try:
-        before = state if guess is None else guess.after(state)
-        added, after = _advanced_by(effect, at, before)
+        added, after = _advanced_by(effect, at, _near(effect, state, near))
     except MissingSignalError as missing:
         signal = str(missing)
         said = left_out(effect.name, signal)
         return Advanced(effect, at, state, NOTHING, state, (said,), signal)
     return Advanced(effect, at, state, added, after, _first_order(effect, added))
+
+
+def _near(effect: Effect, state: Any, near: Guesses) -> Any:
+    """Return the state with which to begin, where another model ended if its law guesses."""
+    guess = near.get(effect.name)
+    return state if guess is None else guess.after(state)
 
 
 def _known(effect: Effect, at: Situation, state: Any, like: Evaluated | None) -> Advanced | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -70,6 +70,9 @@ class Law:
         alone: it gets the state of the sample before, or what another model has at the same
         samples.  Such a state has `last`, what the next block gets of it, and `after(before)`, the
         same beginning with the past of another state: see `pin_rest.Rest`.
+    rests_together : bool
+        Whether its effects at several places act on each other, so that `together` advances them at
+        once; of laws of the catalogue alone.
     smooth : bool
         Whether its columns show it as it is.  Not where it sticks, or where walls and flanges touch
         or do not: there a search tries the law itself.
@@ -91,6 +94,7 @@ class Law:
     own: tuple[Parameter, ...]
     many_waves: bool = False
     state_is_a_guess: bool = False
+    rests_together: bool = False
     smooth: bool = True
     inexactness: float = 0.1
     file: Path | None = None
@@ -162,6 +166,16 @@ class Law:
             If a signal that it needs is absent.
         """
         return self.added(at, place, values), None
+
+    def together(
+        self,
+        at: Situation,
+        places: Sequence[str],
+        values: Sequence[SIValues],
+        states: Sequence[Any],
+    ) -> list[Outcome]:
+        """Return the same of effects at several places, which may act on each other."""
+        return [self.advance(at, *own) for own in zip(places, values, states, strict=True)]
 
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the same of a law that remembers nothing."""

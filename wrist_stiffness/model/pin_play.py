@@ -1,8 +1,8 @@
-"""Where a pin comes to rest in its play, when flanges may hold it off the wall.
+"""Where pins come to rest in their play, when flanges may hold them off the wall.
 
-Inside its play the pin is free, so a flange that touches pushes it away instead of being pressed by
-it.  The pin's two ends find the least of a convex energy (load, walls, flanges), by Newton's method
-with Armijo's rule:
+Inside its play a pin is free, so a flange that touches pushes it away instead of being pressed by
+it.  The ends of all pins find the least of a convex energy (load, walls, flanges) together, by
+Newton's method with Armijo's rule:
 
     Phi(x) = -F x + sum over ends wall(|x_end|) + 1/2 lambda' A lambda
     0 <= lambda  perpendicular to  gap + B x + A lambda >= 0,       grad Phi = wall - F - B' lambda
@@ -42,22 +42,21 @@ MAX_HALVINGS, ARMIJO = 40, 1e-4
 
 @dataclass(frozen=True)
 class Play:
-    """Pins of one joint at n samples."""
+    """Pins with e ends at n samples: of each pin the upper and the lower one."""
 
-    radial: float  # how far an end may move from the middle [m], above 0
-    force: Array  # (n, 4), radial force on the upper and the lower end with all flanges open [N]
-    gap: Array  # (n, m), openings of the flange sectors with the pin in the middle [m]
-    opening: Array  # (n, m, 4), B, what the ends' displacements open
+    radial: float | Array  # how far an end, or each (e,), may move from the middle [m], above 0
+    force: Array  # (n, 2 e), radial force on each end with all flanges open [N]
+    gap: Array  # (n, m), openings of the flange sectors with the pins in the middle [m]
+    opening: Array  # (n, m, 2 e), B, what the ends' displacements open
     approach: Array  # (n, m, m), A, flexibility of the flanges [m/N]
     # an end that carries less does not reach its wall altogether [N]
     small_force: float = field(default=SMALL_FORCE, kw_only=True)
 
     def resting(self, near: Array | None = None) -> Array:
-        """Return the displacements of both ends, (n, 4) [m].
+        """Return the displacements of the ends across their axes, (n, 2 e) [m].
 
-        `near` (n, 4): where the search begins.  The energy is convex, so it changes the cost and
-        not the result beyond rounding [m].  Gives (n, 4): upper end, lower end; each across the
-        axis.
+        `near` (n, 2 e): where the search begins.  The energy is convex, so it changes the cost and
+        not the result beyond rounding [m].
         """
         new = self._unlike_the_one_before()
         if not new.all():
@@ -76,7 +75,7 @@ class Play:
         return x
 
     def softness(self, x: Array) -> Array:
-        """Return how pins at x (n, 4) give way to further forces on their ends, (n, 4, 4) [m/N]."""
+        """Return how pins at x give way to further forces on their ends, (n, 2 e, 2 e) [m/N]."""
         active = self._state(x, WALLS[-1], None)[2]
         return np.asarray(np.linalg.inv(Play._hessian(self, x, WALLS[-1], active)))
 
@@ -90,7 +89,7 @@ class Play:
         return new
 
     def _hindered(self, x: Array, near: Array | None) -> Array:
-        """Return where the ends rest against walls and flanges, from a first guess (n, 4)."""
+        """Return where the ends rest against walls and flanges, from a first guess (n, 2 e)."""
         begin = x if near is None else near
         found, gradient, active, rests = self._newton(begin, WALLS[-1], FORCE_TOLERANCE, FEW_STEPS)
         left = np.flatnonzero(~rests)
@@ -104,14 +103,14 @@ class Play:
         return found + self._step(found, WALLS[-1], gradient, active)
 
     def _step(self, x: Array, wall: float, gradient: Array, active: NDArray[np.bool_]) -> Array:
-        """Return Newton's step, (n, 4)."""
+        """Return Newton's step, (n, 2 e)."""
         hessian = self._hessian(x, wall, active)
         return np.asarray(np.linalg.solve(hessian, -gradient[..., None])[..., 0], dtype=float)
 
     def _newton(
         self, x: Array, wall: float, tolerance: float, most_steps: int = MAX_STEPS
     ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return where the steps end and the gradient there, (n, 4), touching sectors, who rests.
+        """Return where the steps end and the gradient there, (n, 2 e), touching sectors, who rests.
 
         Steps are bent along the walls: straight ones would run into them.
         """
@@ -133,7 +132,7 @@ class Play:
             rounding = 1e-14 * np.abs(left.force * x[rows]).sum(axis=1)
             start, size, far = energy.copy(), np.ones(len(rows)), np.arange(len(rows))
             tried = np.empty_like(step)
-            depth = np.linalg.norm(gradient.reshape(-1, 2, 2), axis=-1) / wall
+            depth = np.linalg.norm(_ends(gradient), axis=-1) / wall
             for halved in range(MAX_HALVINGS):
                 size[far] *= 0.5 if halved else 1.0
                 part = left if len(far) == len(rows) else left.take(far)
@@ -148,17 +147,17 @@ class Play:
         return x, slopes, touching, rests
 
     def _along(self, x: Array, step: Array, depth: Array) -> Array:
-        """Return where a step leads, (n, 4), with ends as far in their walls as it says.
+        """Return where a step leads, (n, 2 e), with ends as far in their walls as it says.
 
-        Ends off their walls, of which it knows nothing, go into them by at most `depth` (n, 2).
+        Ends off their walls, of which it knows nothing, go into them by at most `depth` (n, e).
         """
         size, into, direction = self._at_walls(x)
-        outward = size + (direction * step.reshape(-1, 2, 2)).sum(axis=-1)
+        outward = size + (direction * _ends(step)).sum(axis=-1)
         most = np.where(into > 0.0, np.maximum(outward, 0.5 * self.radial), self.radial + depth)
-        ends = (x + step).reshape(-1, 2, 2)
+        ends = _ends(x + step)
         length = np.linalg.norm(ends, axis=-1)
         share = np.divide(most, length, out=np.ones_like(length), where=length > most)
-        return (share[..., None] * ends).reshape(-1, 4)
+        return (share[..., None] * ends).reshape(x.shape)
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
         """Return some of the samples."""
@@ -170,31 +169,32 @@ class Play:
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in OF_ALL}
 
     @property
-    def _centring(self) -> float:
-        return self.small_force / self.radial
+    def _centring(self) -> Array:
+        return np.asarray(self.small_force / self.radial)
 
     def _unhindered(self) -> Array:
         """Return the displacements with all flanges open: along the forces."""
-        ends = self.force.reshape(-1, 2, 2)
-        size = np.linalg.norm(ends, axis=-1, keepdims=True)
+        ends = _ends(self.force)
+        size = np.linalg.norm(ends, axis=-1)
         pressed = self.radial + (size - self.small_force) / (self._centring + WALLS[-1])
-        moved = np.where(size < self.small_force, size / self._centring, pressed)
+        moved = np.where(size < self.small_force, size / self._centring, pressed)[..., None]
+        size = size[..., None]
         direction = np.divide(ends, size, out=np.zeros_like(ends), where=size > 0.0)
-        return (moved * direction).reshape(-1, 4)
+        return (moved * direction).reshape(self.force.shape)
 
     def _state(
         self, x: Array, stiffness: float, guess: NDArray[np.bool_] | None
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return energy (n,), its gradient (n, 4) and the touching sectors at displacements x."""
+        """Return energy (n,), its gradient (n, 2 e) and the touching sectors at displacements x."""
         gap = self.gap + (self.opening @ x[..., None])[..., 0]
         flange, active = solve_contacts(self.approach, gap, guess)
         size, into, direction = self._at_walls(x)
-        wall = self._centring * x.reshape(-1, 2, 2) + stiffness * into[..., None] * direction
+        wall = self._centring[..., None] * _ends(x) + stiffness * into[..., None] * direction
         pressed = 0.5 * (self._centring * size**2 + stiffness * into**2).sum(axis=1)
         bent = 0.5 * np.einsum("ni,nij,nj->n", flange, self.approach, flange)
         pushed = (np.swapaxes(self.opening, -1, -2) @ flange[..., None])[..., 0]
         energy = pressed + bent - np.einsum("ni,ni->n", self.force, x)
-        return energy, wall.reshape(-1, 4) - self.force - pushed, active
+        return energy, wall.reshape(x.shape) - self.force - pushed, active
 
     def _hessian(self, x: Array, stiffness: float, active: NDArray[np.bool_]) -> Array:
         opened = np.swapaxes(self.opening, -1, -2)
@@ -204,16 +204,22 @@ class Play:
         share = np.divide(into, size, out=np.zeros_like(into), where=size > 0.0)
         normal = np.where(into > 0.0, stiffness, 0.0)[..., None, None] * along
         across = stiffness * share[..., None, None] * (np.eye(2) - along)
-        blocks = self._centring * np.eye(2) + across + normal
-        hessian[:, :2, :2] += blocks[:, 0]
-        hessian[:, 2:, 2:] += blocks[:, 1]
+        blocks = self._centring[..., None, None] * np.eye(2) + across + normal
+        for end in range(blocks.shape[1]):
+            own = slice(2 * end, 2 * end + 2)
+            hessian[:, own, own] += blocks[:, end]
         return hessian
 
     def _at_walls(self, x: Array) -> tuple[Array, Array, Array]:
         """Return how far each end is off the middle, how far in its wall, and its direction."""
-        ends = x.reshape(-1, 2, 2)
+        ends = _ends(x)
         size = np.linalg.norm(ends, axis=-1)
         direction = np.divide(
             ends, size[..., None], out=np.zeros_like(ends), where=size[..., None] > 0.0
         )
         return size, np.maximum(size - self.radial, 0.0), direction
+
+
+def _ends(x: Array) -> Array:
+    """Return vectors (n, 2 e) by the ends, (n, e, 2)."""
+    return x.reshape(len(x), x.shape[1] // 2, 2)

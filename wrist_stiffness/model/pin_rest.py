@@ -1,4 +1,4 @@
-"""Where the pin of a joint rests in its play: among flanges, and held by other joints that rub.
+"""Where the pins of joints rest in their play: among flanges, and held by joints that rub.
 
 A joint that sticks holds a pin off its wall, for the pin cannot move without the joint's slide and
 turn.  What the bristles of that joint hold, slip included, has a convex energy, so the pin rests
@@ -8,6 +8,7 @@ depend on where the pin rests in turn; they follow in passes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +30,7 @@ any blocks give the same."""
 class Rest:
     """Where a pin rested at n samples."""
 
-    # (n, 4), of the pin with nothing that rubs, in units of the play; where a search may begin
+    # (n, 4), of one pin with nothing that rubs, in units of the play; where a search may begin
     ends: Array
     # (PASSES, j, 2), where the bristles of j joints that rub stand after the last sample, in each
     # pass [m]
@@ -50,7 +51,7 @@ class HeldPlay(Play):
     """Pins that cannot move without j joints that rub."""
 
     bent: Array  # (n, j, 2), from the bristles' feet to the surface, with the pin in the middle [m]
-    drag: Array  # (n, j, 2, 4), what the ends' displacements add to it
+    drag: Array  # (n, j, 2, 2 e), what the ends' displacements add to it
     compliance: Array  # (n, j, 2), of the bristles [m/N]
     budget: Array  # (n, j), their largest force [N]
 
@@ -77,35 +78,39 @@ class HeldPlay(Play):
 
 
 @dataclass(frozen=True, eq=False)
-class Pin:
-    """A pin with play in a situation."""
+class Pins:
+    """The p pins with play in a situation."""
 
     at: Situation  # n samples
-    place: str
-    radial: float  # how far an end may move from the middle [m], above 0
+    places: Sequence[str]
+    radial: Array  # (p,), how far an end may move from the middle [m], above 0
 
-    def rest(self, before: Rest | None) -> tuple[Contribution, Rest]:
-        """Return what the play adds, and where the pin rests.
+    def rest(self, before: Sequence[Rest | None]) -> list[tuple[Contribution, Rest]]:
+        """Return what the play of each adds, and where it rests.
 
         `before`: of the block before, with a place for the search to begin.
         """
-        near, feet = None, None
-        if before is not None:
-            feet = before.feet
-            if len(before.ends) == len(self.at.block):
-                # In units of the play: with a little more of it the pin rests at its wall still.
-                near = self.radial * before.ends
+        known = [each for each in before if each is not None]
+        near, feet = None, known[0].feet if known else None
+        if all(each is not None and len(each.ends) == len(self.at.block) for each in before):
+            # In units of the play: with a little more of it the pin rests at its wall still.
+            near = self._ends_scale * np.concatenate([each.ends for each in known], axis=1)
         x = self._free.resting(near)
         if self.at.given.rubbing is None:
-            return self._screw(x), Rest(x / self.radial)
-        added, feet = self._held(x, feet)
-        return added, Rest(x / self.radial, feet)
+            moved, more = x, NOTHING
+        else:
+            moved, more, feet = self._held(x, feet)
+        # What joints that rub do besides is told with the first pin.
+        screws = self._screws(moved)
+        screws[0] = more + screws[0]
+        ends = np.split(x / self._ends_scale, len(self.places), axis=1)
+        return [(screw, Rest(each, feet)) for screw, each in zip(screws, ends, strict=True)]
 
-    def _held(self, x: Array, before: Array | None) -> tuple[Contribution, Array]:
-        """Return what the held pin adds and the bristles' feet after it.
+    def _held(self, x: Array, before: Array | None) -> tuple[Array, Contribution, Array]:
+        """Return where the held pins rest, how the joints that rub push more, and their feet.
 
-        `x` (n, 4): where it would rest if nothing rubbed [m]; `before` (PASSES, j, 2): feet before
-        the first sample [m].
+        `x` (n, 4 p): where they would rest if nothing rubbed [m]; `before` (PASSES, j, 2): feet
+        before the first sample [m].
         """
         at, rubbing = self.at, self.at.given.rubbing
         drag = np.stack([self._drag(each) for each in rubbing], axis=1)
@@ -113,7 +118,7 @@ class Pin:
         more, feet = NOTHING, []
         for number in range(PASSES):
             rubbed = at.with_more(more)
-            loose = rubbed.with_more(self._screw(x))
+            loose = rubbed.with_more(sum(self._screws(x), NOTHING))
             surface = _dragged_by(drag, x)
             bristles = [
                 replace(each, force=force[:, j]).bristles(loose) for j, each in enumerate(rubbing)
@@ -133,7 +138,7 @@ class Pin:
             ]
             feet.append([each[-1] for each in stood])
             held = HeldPlay(
-                self.radial,
+                free.radial,
                 free.force + _on_ends(drag, force),
                 free.gap,
                 free.opening,
@@ -147,38 +152,52 @@ class Pin:
             force = held.held(x)[1]
             pushes = (each.push(at, force[:, j] - known[:, j]) for j, each in enumerate(rubbing))
             more = sum(pushes, NOTHING)
-        return more + self._screw(x), np.array(feet)
+        return x, more, np.array(feet)
 
-    def _screw(self, x: Array) -> Contribution:
-        return self.at.screw(self.place, x @ end_screws(self.at.table.geometry, self.place))
+    def _screws(self, x: Array) -> list[Contribution]:
+        geometry, every = self.at.table.geometry, np.split(x, len(self.places), axis=1)
+        return [
+            self.at.screw(place, own @ end_screws(geometry, place))
+            for place, own in zip(self.places, every, strict=True)
+        ]
+
+    @property
+    def _ends_scale(self) -> Array:
+        return np.repeat(self.radial, 4)
 
     @property
     def _free(self) -> Play:
         """The play with what is in the situation, and nothing that holds it but flanges."""
-        at, ends = self.at, end_screws(self.at.table.geometry, self.place)
-        opening = np.stack([at.carried(at.screw(self.place, end))[1] for end in ends], axis=-1)
-        carried = at.at_home(self.place, at.through_place(self.place)) @ ends.T
-        flanges = (np.swapaxes(opening, -1, -2) @ at.contact_force[..., None])[..., 0]
+        at = self.at
+        opening, carried = [], []
+        for place in self.places:
+            ends = end_screws(at.table.geometry, place)
+            opening += [at.carried(at.screw(place, end))[1] for end in ends]
+            carried.append(at.at_home(place, at.through_place(place)) @ ends.T)
+        opens = np.stack(opening, axis=-1)
+        flanges = (np.swapaxes(opens, -1, -2) @ at.contact_force[..., None])[..., 0]
         gap, approach = at.free[1], at.operators.approach
-        force = carried - flanges
-        return Play(self.radial, force, gap, opening, approach)
+        force = np.concatenate(carried, axis=1) - flanges
+        return Play(np.repeat(self.radial, 2), force, gap, opens, approach)
 
     def _drag(self, rubbing: Rubbing) -> Array:
-        """Return how a joint turns (radius times angle) and slides with the pin's ends."""
+        """Return how a joint turns (radius times angle) and slides with the pins' ends."""
         at, joint = self.at, PASSIVE_JOINTS.index(rubbing.joint)
-        row = at.influence.slides()[:, ELASTIC.index(self.place), joint]
-        ends = [at.in_base(self.place, end) for end in end_screws(at.table.geometry, self.place)]
-        slide = [(row * end[:, :3]).sum(axis=1) for end in ends]
-        turn = [(row * end[:, 3:]).sum(axis=1) for end in ends]
-        radius = rubbing.radius(at.table.geometry)
+        rows = at.influence.slides()[..., joint, :]
+        radius, turn, slide = rubbing.radius(at.table.geometry), [], []
+        for place in self.places:
+            row = rows[:, ELASTIC.index(place)]
+            ends = [at.in_base(place, end) for end in end_screws(at.table.geometry, place)]
+            slide += [(row * end[:, :3]).sum(axis=1) for end in ends]
+            turn += [(row * end[:, 3:]).sum(axis=1) for end in ends]
         return np.stack([radius * np.stack(turn, axis=1), np.stack(slide, axis=1)], axis=1)
 
 
 def _dragged_by(drag: Array, x: Array) -> Array:
-    """Return how far surfaces go (n, j, 2) with the ends of a pin (n, 4)."""
+    """Return how far surfaces go (n, j, 2) with the ends of pins (n, 2 e)."""
     return np.asarray((drag @ x[:, None, :, None])[..., 0])
 
 
 def _on_ends(drag: Array, force: Array) -> Array:
-    """Return what forces (n, j, 2) on bristles are at the ends of a pin, (n, 4)."""
+    """Return what forces (n, j, 2) on bristles are at the ends of pins, (n, 2 e)."""
     return np.asarray((np.swapaxes(drag, -1, -2) @ force[..., None])[..., 0].sum(axis=1))

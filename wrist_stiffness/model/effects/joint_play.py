@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.model.columns import Recipe, at_usual_size, share_of_shape
 from wrist_stiffness.model.law import NOTHING, Contribution, Law, Outcome, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter
-from wrist_stiffness.model.pin_rest import Pin
+from wrist_stiffness.model.pin_rest import Pins
 
 GAPS_UM = (-40.0, -10.0, -2.0, 2.0, 10.0, 40.0)
 """Changes of a gap that are tried first, of both signs."""
@@ -46,14 +47,15 @@ class JointClearance(Law):
 
     Force and moment of the bearing are two end forces, half a sleeve's length off its centre; each
     end moves by half the diametral clearance along its own.  Equal end forces shift the pin,
-    opposite ones tilt it.  A flange that touches pushes the pin back within its play, and a joint
-    that rubs holds it.
+    opposite ones tilt it.  A flange that touches pushes the pin back within its play, and pins of
+    other joints with it; a joint that rubs holds it.
     """
 
     id = "joint_clearance"
     stage = "reaction"
     places = JOINTS
     state_is_a_guess = True
+    rests_together = True
     sentence = "{place} has play: the pin lies on the side of its bearing force"
     check = "push and pull the joint across its axis with a dial gauge; swap the bushing"
     excited_by = "loads of opposite directions, so that the bearing force changes sides"
@@ -66,7 +68,22 @@ class JointClearance(Law):
 
     def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the screw of the play."""
-        radial = 0.5 * values["clearance_um"]
-        if radial == 0.0:
-            return NOTHING, None
-        return Pin(at, place, radial).rest(state)
+        (found,) = self.together(at, [place], [values], [state])
+        return found
+
+    def together(
+        self,
+        at: Situation,
+        places: Sequence[str],
+        values: Sequence[SIValues],
+        states: Sequence[Any],
+    ) -> list[Outcome]:
+        """Return the screws of all pins, which rest together among the flanges."""
+        radial = np.array([0.5 * each["clearance_um"] for each in values])
+        loose = np.flatnonzero(radial).tolist()
+        found: list[Outcome] = [(NOTHING, None)] * len(places)
+        if loose:
+            pins = Pins(at, [places[n] for n in loose], radial[loose])
+            for n, each in zip(loose, pins.rest([states[n] for n in loose]), strict=True):
+                found[n] = each
+        return found
