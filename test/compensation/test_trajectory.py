@@ -10,6 +10,7 @@ from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.compiled import CorrectedRows
 from wrist_stiffness.model.error_model import ErrorModel
 
 NAMES = ("motor_2_joint", "gripper", "motor_1_joint")
@@ -82,6 +83,23 @@ def test_at_the_border_the_speed_is_that_of_the_plan(stream):
     assert answer.fault is None
     (point,) = answer.points
     assert point.velocities == pytest.approx([0.0, 0.0, 1.0], abs=0.01)
+
+
+def test_what_is_not_corrected_has_nothing_of_what_was_in_memory(stream, monkeypatch):
+    """Beyond the border, where another search takes over, rows of answers stay as they were."""
+    own = CorrectedRows.room
+
+    def room(*sizes):
+        found = own(*sizes)
+        found.rows.fill(np.inf)
+        return found
+
+    monkeypatch.setattr(CorrectedRows, "room", room)
+    _, upper = stream.model.table.workspace.rectangle
+    planned = planned_point(3, [0.0, 0.0, upper[0] - 1e-4], [0.0, 0.0, 1.0])
+    answer = stream.on_trajectory(SECOND, "", NAMES, [planned])
+    assert answer.fault is None
+    assert np.isfinite(answer.points[0].positions).all()
 
 
 BAD = {

@@ -179,11 +179,13 @@ class PlanCorrector:
             state = CorrectorState(np.zeros(2), self.running.contact, np.zeros(2), np.zeros(1, int))
             end = compiled.correct(self._task, None, commands, state, found, None, i, i + 1)
             inside[i] = end > i
-        there = Configuration.of_row(np.ascontiguousarray(found.configuration))
+        # The other rows hold whatever was in memory.
+        done = np.flatnonzero(inside)
+        there = Configuration.of_row(found.configuration[done])
         weight = guard_weight(table.workspace, there, self.settings.safety)
-        delta = self.held.share * weight[:, None] * found.applied
-        sent = within_joint_limits(theta, delta, table.geometry.limits)
-        return [row if known else None for row, known in zip(sent, inside.tolist(), strict=True)]
+        delta = self.held.share * weight[:, None] * found.applied[done]
+        sent = iter(within_joint_limits(theta[done], delta, table.geometry.limits))
+        return [next(sent) if known else None for known in inside.tolist()]
 
     def _searched(self, theta: Array, theta_dot: Array | None, beside: bool) -> Array:
         """Return corrected angles for planned ones; beside a point, beyond the border, those."""
