@@ -93,7 +93,10 @@ def main(samples: int) -> None:
     line("one sample without effects, predict", one)
     for name, model in (
         ("one sample without effects", plain),
-        (f"one sample with {TYPICAL[1]}", plain.with_effects(plausible(TYPICAL[1]))),
+        *(
+            (f"one sample with {name}", plain.with_effects(plausible(name)))
+            for name in (TYPICAL[1], "joint_friction@joint_4")
+        ),
         ("one sample with three effects", typical),
         (f"one sample with the {len(free)} of a calibration", calibrated),
         ("the same and backlash", extended),

@@ -9,7 +9,7 @@ the same thing: the same object, with the same state.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import is_
@@ -310,11 +310,9 @@ def _together(
 ) -> list[Advanced]:
     if not effects:
         return []
-    known = [_known(e, at, s, like) for e, s in zip(effects, states, strict=True)]
-    same = [each for each in known if each is not None]
-    others = [] if like is None else like.known.values()
-    if len(same) == len(effects) == sum(_rests_together(each.effect) for each in others):
-        return same
+    known = _all_known(effects, at, states, like, _rests_together)
+    if known:
+        return known
     before = [_near(*each, near) for each in zip(effects, states, strict=True)]
     places, values = [each.component for each in effects], [each.si for each in effects]
     found = effects[0].law.together(at, places, values, before)
@@ -352,6 +350,23 @@ def _known(effect: Effect, at: Situation, state: Any, like: Evaluated | None) ->
     return known if known is not None and known.at is at and known.before is state else None
 
 
+def _all_known(
+    effects: Sequence[Effect],
+    at: Situation,
+    states: Sequence[Any],
+    like: Evaluated | None,
+    acts: Callable[[Effect], bool],
+) -> list[Advanced]:
+    """Return what effects that act on each other did in another evaluation; empty if it is new.
+
+    `acts`: tells which effects do: there may be no further one.
+    """
+    found = [_known(e, at, s, like) for e, s in zip(effects, states, strict=True)]
+    same = [each for each in found if each is not None]
+    theirs = [] if like is None else [each for each in like.known.values() if acts(each.effect)]
+    return same if len(same) == len(effects) == len(theirs) else []
+
+
 def _settled(
     effects: Sequence[Effect], at: Situation, states: Sequence[Any], like: Evaluated | None
 ) -> list[Advanced]:
@@ -360,10 +375,9 @@ def _settled(
     `states`: one for each pass, or None.  A law that tells what rubs gets a situation in which its
     own force acts, any other law one without it.
     """
-    known = [_known(e, at, s, like) for e, s in zip(effects, states, strict=True)]
-    same = [each for each in known if each is not None]
-    if like is not None and len(same) == len(effects) == len(like.added(RUBS)):
-        return same
+    known = _all_known(effects, at, states, like, lambda effect: effect.stage == RUBS)
+    if known:
+        return known
     found: dict[int, Advanced] = {}
     pushes: dict[int, Contribution] = {}
     ends: list[tuple[Any, ...]] = [() for _ in effects]
