@@ -291,7 +291,7 @@ class FitProblem:
             trial = (*self.model.effects, *other)
             trials.append(trial if unknown.effect.name in held else _as_held(trial, held))
             moved.append(place)
-        return model.along(trials), moved, step
+        return model.along(trials, slopes=width == STEP), moved, step
 
     def same_as(self, other: FitProblem) -> bool:
         """Tell whether another problem asks the same, so that what is known of it may be used."""

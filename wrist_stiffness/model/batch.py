@@ -112,6 +112,7 @@ def predicted(
     accepted: NDArray[np.bool_],
     near: Sequence[Guesses] = (),
     recent: Recent | None = None,
+    slopes: bool = False,
 ) -> list[BlockPrediction]:
     """Predict a recording with models that share their table.
 
@@ -119,12 +120,13 @@ def predicted(
 
     `block`: n samples; `accepted` (n,): those inside the table's domain and load range; the
     effects' memory passes over the rest; `near`: `guesses` of an earlier prediction of this block;
-    `recent`: of this block; then `models` begin with what it says is like the first.  Raises
+    `recent`: of this block; then `models` begin with what it says is like the first; `slopes`: as
+    for `evaluate_beside`.  Raises
     `InputError` if a user's formula has no finite value; the message says how long after the first
     sample.
     """
     try:
-        return _predicted(models, block, accepted, near, recent or Recent())
+        return _predicted(models, block, accepted, near, recent or Recent(), slopes)
     except UndefinedFormulaError as error:
         after = error.time_s - float(block.time[0])
         raise InputError(f"{error}, {after:.3f} s after the start") from error
@@ -136,6 +138,7 @@ def _predicted(
     accepted: NDArray[np.bool_],
     near: Sequence[Guesses],
     recent: Recent,
+    slopes: bool,
 ) -> list[BlockPrediction]:
     usable, rows = block.take(accepted), np.flatnonzero(accepted)
     twists, measured = np.full((2, len(models), len(block), 6), np.nan)
@@ -155,7 +158,7 @@ def _predicted(
         for group in (slice(0, 1), *groups):
             found = [first]
             if group.start:
-                found = evaluate_beside(models[group], memories[group], first)
+                found = evaluate_beside(models[group], memories[group], first, slopes)
             memories[group] = [each.memory for each in found]
             twists[group, own] = [each.twist for each in found]
             measured[group, own] = seen_by(found)

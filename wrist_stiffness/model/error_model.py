@@ -315,6 +315,7 @@ class ErrorModel:
         additions: Sequence[Sequence[Effect]],
         near: Sequence[Mapping[str, Any]] = (),
         recent: Recent | None = None,
+        slopes: bool = False,
     ) -> list[BlockPrediction]:
         """Predict a whole recording once for each of several additions to the model's effects.
 
@@ -331,6 +332,9 @@ class ErrorModel:
             `guesses` of an earlier prediction of this block: it changes the cost alone.
         recent : Recent, optional
             What was done at this block the last time: likewise.
+        slopes : bool
+            Whether the models differ from the first one by little, for slopes: then constants are
+            carried to first order, which is far quicker.
 
         Returns
         -------
@@ -341,7 +345,7 @@ class ErrorModel:
         if recent is not None:
             first = recent.like(first)
         models = [first, *(first.with_effects(*self.effects, *e) for e in additions[1:])]
-        return predicted(models, block, self.accepts(block), near, recent)
+        return predicted(models, block, self.accepts(block), near, recent, slopes)
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:
         """Tell which samples of a block are finite, in the domain and in the load range, (n,)."""

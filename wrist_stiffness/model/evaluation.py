@@ -40,6 +40,7 @@ from wrist_stiffness.model.law import STAGES
 from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.prediction import seen
 from wrist_stiffness.model.situation import BlockStatics, Situation, lengths
+from wrist_stiffness.model.slopes import only_constants_differ, with_constants
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -180,7 +181,10 @@ def evaluate(
 
 
 def evaluate_beside(
-    models: Sequence[ErrorModel], memories: Sequence[Memory | None], like: Evaluated
+    models: Sequence[ErrorModel],
+    memories: Sequence[Memory | None],
+    like: Evaluated,
+    slopes: bool = False,
 ) -> list[Evaluated]:
     """Evaluate further models over the block of one that was evaluated.
 
@@ -188,20 +192,23 @@ def evaluate_beside(
     serve, flange contact is solved for all models with the same elastic parts together.
 
     `models`: with the same table; `memories`: what the block before left of each; `like`: the first
-    model.
+    model; `slopes`: whether they differ from it by little, so that their constants may be taken as
+    `slopes.with_constants` does.
     """
+    alike = [slopes and only_constants_differ(model, like) for model in models]
+    known = iter(with_constants([m for m, same in zip(models, alike, strict=True) if same], like))
     every = [
-        _staged(model, _start(model, like), memory, like, like.guesses)
-        for model, memory in zip(models, memories, strict=True)
+        next(known) if same else _staged(model, _start(model, like), memory, like, like.guesses)
+        for model, memory, same in zip(models, memories, alike, strict=True)
     ]
     at = like.situation
     open_ones = [each.situation for each in every if "answer" not in vars(each.situation)]
-    alike = [each for each in open_ones if each.statics is at.statics and each.wrist is None]
-    if alike:
-        gaps = np.stack([other.free[1] for other in alike], axis=1)
+    together = [each for each in open_ones if each.statics is at.statics and each.wrist is None]
+    if together:
+        gaps = np.stack([other.free[1] for other in together], axis=1)
         force, active = solve_contacts(at.operators.approach, gaps, like.active[:, None])
         pushed = force @ np.swapaxes(at.operators.force_twist, -1, -2)
-        for t, other in enumerate(alike):
+        for t, other in enumerate(together):
             vars(other)["answer"] = other.free[0] + pushed[:, t], force[:, t], active[:, t]
     return every
 

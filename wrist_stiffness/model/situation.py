@@ -57,21 +57,16 @@ class BlockStatics:
 
     def with_parts(self, parts: ElasticComponents) -> BlockStatics:
         """Return the statics of the same samples with other parts."""
-        other, known = self.without_operators(parts), vars(self)
+        if parts is self.parts:
+            return self
+        other = self.without_operators(parts)
         if (
-            "operators" in known
+            "operators" in vars(self)
             and "own_weight" in vars(other)
             and self.evaluation == "closed_form"
             and parts.contact.keys() == self.parts.contact.keys()
         ):
-            vars(other)["operators"] = changed_operators(
-                self.operators,
-                self.configuration,
-                self.parts,
-                parts,
-                self.table.geometry.gravity,
-                self.own_weight,
-            )
+            vars(other)["_changed_from"] = self
         return other
 
     def without_operators(self, parts: ElasticComponents) -> BlockStatics:
@@ -90,13 +85,14 @@ class BlockStatics:
         """Elastic operators of shape (n,)."""
         if self.evaluation == "spline":
             return self.table.operators_at(self.configuration, "spline")
+        own = self.table.geometry.gravity, self.own_weight
+        known = vars(self).pop("_changed_from", None)
+        if known is not None:
+            return changed_operators(
+                known.operators, self.configuration, known.parts, self.parts, *own
+            )
         return assembled_operators(
-            self.configuration,
-            self.influence,
-            self.parts,
-            self.turned_flexibility,
-            self.table.geometry.gravity,
-            self.own_weight,
+            self.configuration, self.influence, self.parts, self.turned_flexibility, *own
         )
 
     @cached_property

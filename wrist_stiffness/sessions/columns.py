@@ -79,21 +79,23 @@ class SessionModel:
             known[asked] = memory.states[0] is not None
         return bool(known[asked])
 
-    def along(self, trials: Sequence[Effects]) -> list[Array]:
+    def along(self, trials: Sequence[Effects], slopes: bool = False) -> list[Array]:
         """Return what the sensor would say of each unit, from all its moments, (u, 6).
 
         In motion the mean of a pose is not the pose at the mean angles: a target a millimetre off
-        bends that by micrometres.
+        bends that by micrometres.  `slopes`: whether the trials differ from the first by little.
         """
-        return self.predicted(trials, [True] * len(trials))
+        return self.predicted(trials, [True] * len(trials), slopes)
 
-    def _batch(self, trials: Sequence[Effects], moments: Moments) -> list[Array]:
+    def _batch(
+        self, trials: Sequence[Effects], moments: Moments, slopes: bool = False
+    ) -> list[Array]:
         """Return what the sensor would say of each unit, (u, 6); pins begin where they rested."""
         session = self.session if moments is Moments.PATH else self._without_path
         block = self.session.still if moments is Moments.MEAN else session.block
         rests = self._rests.get(moments, ())
         recent = self.session.known.setdefault(moments, Recent())
-        found = self.model.with_effects().batch_with(block, trials, rests, recent)
+        found = self.model.with_effects().batch_with(block, trials, rests, recent, slopes)
         self._rests[moments] = found[0].guesses
         if moments is Moments.MEAN:
             return [each.measured for each in found]
@@ -108,11 +110,15 @@ class SessionModel:
         return {}
 
     def predicted(
-        self, trials: Sequence[Effects], along: Sequence[bool] | None = None
+        self,
+        trials: Sequence[Effects],
+        along: Sequence[bool] | None = None,
+        slopes: bool = False,
     ) -> list[Array]:
         """Return the same, good enough for differences: the path only where an effect needs it.
 
-        `along`: which of them are evaluated on the path; by default those that remember.
+        `along`: which of them are evaluated on the path; by default those that remember; `slopes`:
+        as for `along`.
         """
         path = [self.remembers(trial) for trial in trials] if along is None else along
         wanted = [self._moments(*each) for each in zip(trials, path, strict=True)]
@@ -121,7 +127,7 @@ class SessionModel:
             chosen = [i for i, own in enumerate(wanted) if own is moments]
             for start in range(0, len(chosen), AT_A_TIME):
                 part = chosen[start : start + AT_A_TIME]
-                found = self._batch([trials[i] for i in part], moments)
+                found = self._batch([trials[i] for i in part], moments, slopes)
                 for i, each in zip(part, found, strict=True):
                     out[i] = each
         return out
