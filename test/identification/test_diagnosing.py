@@ -75,6 +75,25 @@ def test_a_sound_wrist_whose_fit_stops_at_a_kink_misses_nothing(model, in_the_ce
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "readings"), [(1, 2), (3, 2), (4, 2), (1, 3), (3, 3)])
+def test_a_sound_wrist_read_a_few_times_at_each_rest_misses_nothing(
+    model, in_the_cell, seed, readings
+):
+    """By an instrument that states nothing, 0.4 s apart, as a table of a touch probe holds them."""
+    settings = CellSettings(
+        rate_hz=10.0, program_seconds=240.0, program_seed=seed, base="wrong", base_seed=seed
+    )
+    session = in_the_cell(model.table, settings, seed)
+    cut = as_units(model, session).cut
+    ends = [np.flatnonzero(cut.label == unit)[-1] for unit in np.flatnonzero(cut.dwell)]
+    rows = np.sort(np.concatenate([np.array(ends) - 4 * n for n in range(readings)]))
+    few = replace(session.take(rows), covariance=None)
+    units = as_units(model, few)
+    assert units.cut.dwell.all()
+    assert not WristProblem(model, (units,)).begin().rough
+
+
 def test_backlash_behind_a_wrong_base_is_named_with_its_width(worn):
     _, found = worn
     (finding,) = found.diagnosis.findings

@@ -1,10 +1,12 @@
 """The scatter of what was repeated, whatever else changes between conditions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wrist_stiffness.inference import Observations, Quantity
-from wrist_stiffness.inference.noise import replicate_variance, rich_basis, scatter_of
+from wrist_stiffness.inference.noise import replicate_variance, rich_basis, scatter_of, unstated
 
 
 def test_structure_between_conditions_does_not_reach_the_scatter_of_repeats(rng):
@@ -94,3 +96,32 @@ def test_each_component_has_the_scatter_that_nothing_smooth_explains(rng):
     found, repeats = scatter_of(table, base, structure)
     assert np.allclose(np.sqrt(found), sigma, rtol=0.1)
     assert repeats == 0.0
+
+
+def test_a_base_that_moves_one_component_uses_up_the_freedom_of_that_one(rng):
+    base = np.zeros((60, 2, 30))
+    base[:, 0] = rng.normal(size=(60, 30))
+    found = [
+        scatter_of(Observations(rng.normal(size=(60, 2)), {}), base, np.zeros((60, 2, 0)))[0]
+        for _ in range(200)
+    ]
+    # Drawn to each other by ten degrees of freedom, as ever; the mean of 200 is known to 2 %.
+    assert np.mean(found, axis=0) == pytest.approx([1.0, 1.0], abs=0.05)
+
+
+@pytest.mark.parametrize("alike", [1, 3])
+def test_what_units_share_is_not_taken_for_their_own_scatter(rng, alike):
+    """Stands of so many units; one number in four of each is a hidden count."""
+    n, count = 240, 2.0
+    stand = np.repeat(np.arange(n // alike), alike)
+    shared = np.full((n, 1, 1), count)
+    values = (count * rng.normal(size=n // alike)[stand] + 0.5 * rng.normal(size=n))[:, None]
+    stand = stand if alike > 1 else np.full(n, -1)
+    table = Observations(values, {}, stand=stand, shared=shared)
+    nothing = np.zeros((n, 1, 0))
+    units, variance, _ = unstated(table, nothing, nothing)
+    assert units.shared is not None
+    assert np.sqrt(variance) == pytest.approx(0.5, abs=0.1 if alike > 1 else 0.5)
+    units, variance, _ = unstated(replace(table, values=0.25 * values), nothing, nothing)
+    assert units.shared is None
+    assert np.sqrt(variance) == pytest.approx(0.25 * np.hypot(count, 0.5), rel=0.2)

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import hidden_counts, stands_of
+from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.sessions.units import cut
 
 DRAWS = 4000
@@ -35,15 +38,49 @@ def test_a_position_anywhere_within_a_count_turns_the_platform_as_told(table, mo
     assert (found[:, :3] == 0.0).all()
 
 
-def test_stands_of_two_sessions_are_never_one(table):
+def test_stands_of_two_sessions_are_never_one(model, table):
     """In each: 0  rest  3  move  4  rest  7, and at rest the load comes on."""
     time = np.arange(0.0, 7.0, 0.1)
     theta = np.stack([np.interp(time, (3.0, 4.0), (0.1, 0.4)), np.full(len(time), 0.2)], axis=1)
     load = np.zeros((len(time), 6))
     load[:, 2] = -np.interp(time, (1.0, 2.0, 5.0, 6.0), (0.0, 1.0, 1.0, 2.0))
     block = Block(time, theta, load)
-    each = cut_of(table, block)
-    first, second = np.split(stands_of(table, [each, each]), 2)
+    rotation = table.mechanism.platform_rotation(theta)
+    each = as_units(model, MeasuredSession("a day", block, np.zeros((len(time), 3)), rotation))
+    first, second = np.split(stands_of(model, [each, each]), 2)
     assert ((first < 0) == (second < 0)).all()
     assert len(set(first[first >= 0])) == len(set(second[second >= 0])) == 2
     assert not set(first[first >= 0]) & set(second[second >= 0])
+
+
+def read_at_poses(model, seed, moves, loaded=False):
+    """Twelve poses, each read four times, ten seconds apart: after a new approach, or at rest."""
+    rng, step = np.random.default_rng(seed), model.table.geometry.limits.encoder_step
+    pose = np.repeat(step * np.round(rng.uniform(-0.5, 0.5, (12, 2)) / step), 4, axis=0)
+    hidden = rng.uniform(-0.5, 0.5, (48, 2)) * step
+    if not moves:
+        hidden = np.repeat(hidden[::4], 4, axis=0)
+    load = np.zeros((48, 6))
+    load[:, :3] = loaded * rng.uniform(-1.0, 1.0, (48, 3))
+    block = Block(10.0 * np.arange(48.0), pose, load)
+    seen = model.batch(block).measured
+    shift = seen[:, :3] + rng.normal(0.0, 5e-7, (48, 3))
+    noise = Rotation.from_rotvec(seen[:, 3:] + rng.normal(0.0, 1e-5, (48, 3))).as_matrix()
+    rotation = noise @ model.table.mechanism.platform_rotation(pose + hidden)
+    return as_units(model, MeasuredSession("a day", block, shift, rotation))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_loads_put_on_one_after_the_other_at_rest_are_no_fault_of_the_pose(model, seed):
+    problem = WristProblem(model, (read_at_poses(model, seed, moves=False, loaded=True),))
+    assert not problem.begin().rough
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_whether_motors_moved_between_readings_is_told_by_what_they_show(model, moves):
+    stand = stands_of(model, [read_at_poses(model, 1, moves)])
+    if moves:
+        assert (stand == -1).all()
+    else:
+        assert [len(set(four)) for four in stand.reshape(12, 4).tolist()] == [1] * 12
+        assert len(set(stand.tolist())) == 12

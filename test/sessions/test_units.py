@@ -53,7 +53,7 @@ def test_a_motor_that_comes_to_rest_is_no_stand_yet(end):
     way = np.sin(0.5 * np.pi * ramp(block.time, 3.0, end, 0.0, 1.0))
     block.theta[:, 0] = STEP * np.round(0.5 * way / STEP)
     found = cut_all(block)
-    stands = _stands(found, STEP)
+    stands = _stands(found, STEP, np.inf)
     time = np.array([block.time[found.label == u].mean() for u in range(len(stands))])
     assert (stands[(time > 3.0) & ~found.dwell & (time < 6.0)] == -1).all()
     # Load that comes on at rest changes no count.
@@ -69,7 +69,7 @@ def test_a_count_that_flickers_while_the_load_comes_on_is_a_stand():
     speed[block.time > 6.0, 0] = STEP / 0.05 * np.resize([1.0, 0.0, -1.0], (block.time > 6.0).sum())
     found = cut_all(replace(block, theta_dot=speed))
     time = np.array([block.time[found.label == u].mean() for u in range(len(found.dwell))])
-    loaded = _stands(found, STEP)[time > 6.0]
+    loaded = _stands(found, STEP, np.inf)[time > 6.0]
     assert (loaded == loaded[-1]).all()
     assert loaded[-1] >= 0
 
@@ -184,3 +184,18 @@ def crept(counts):
 def test_a_flickering_count_is_at_rest_and_a_slow_creep_is_not():
     assert crept(1).dwell.tolist() == [True]
     assert not crept(8).dwell.any()
+
+
+@pytest.mark.parametrize("readings", [1, 2, 3])
+def test_a_pose_that_was_read_a_few_times_is_one_rest(readings):
+    """Half a second apart; between two poses nothing was read."""
+    time = (8.0 * np.arange(20)[:, None] + 0.5 * np.arange(readings)).ravel()
+    theta = np.repeat(STEP * np.arange(40.0).reshape(20, 2) * 50.0, readings, axis=0)
+    found = cut_all(Block(time, theta, np.zeros((len(time), 6))))
+    assert found.dwell.all()
+    assert found.label.tolist() == np.repeat(np.arange(20), readings).tolist()
+    # Two poses in one burst are a motion.
+    moving = theta.copy()
+    moving[readings : 2 * readings] += np.linspace(0.0, 0.2, readings)[:, None]
+    found = cut_all(Block(time, moving, np.zeros((len(time), 6))))
+    assert found.dwell.sum() == 20 - (readings > 1)

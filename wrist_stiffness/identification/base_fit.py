@@ -285,15 +285,16 @@ def _descended(
     Columns cost by far the most and hardly change about a fit: those of `near` (u, 6, p), where
     there is one, serve until they lead no further; all of them, or the `known` ones (p,).  The end
     is after a step with all columns of the very point where it began that gains next to nothing;
-    where these are `kept`, it is where they lead no further.
+    where these are `kept`, it is where they lead no further.  A fit that begins far off takes
+    differences, which see flanges that touch within a step; near by, slopes are as good.
     """
     lower, upper = problem.bounds
     weights = problem.weights
     residual = problem.residual(z)
-    scale, columns = 0.0, near
+    scale, columns, slopes = 0.0, near, near is not None
     for _ in range(MOST_STEPS):
         fresh = columns is None
-        columns = _columns(problem, firm, z, columns, known, width)
+        columns = _columns(problem, firm, z, columns, known, width, slopes)
         left = problem.whiten(residual)
         found = _robust_variance(left)
         scale = max(found, COOLING * scale)
@@ -315,7 +316,7 @@ def _descended(
             return BaseFit(problem, z, residual, columns, bare, firm)
         if small or near is None:
             columns = None
-    return BaseFit(problem, z, residual, _columns(problem, firm, z), bare, firm)
+    return BaseFit(problem, z, residual, _columns(problem, firm, z, slopes=slopes), bare, firm)
 
 
 def _columns(
@@ -325,6 +326,7 @@ def _columns(
     near: Array | None = None,
     known: Mask | None = None,
     width: float = STEP,
+    slopes: bool = False,
 ) -> Array:
     """Return the columns of one problem, and of what another has on top of it, (u, 6, p).
 
@@ -332,7 +334,7 @@ def _columns(
 
     `problem`, `firm`: the whole, and the one beside which columns of its own unknowns are taken;
     `z` (p,): where; `near` (u, 6, p): columns of a point near by; `known` (p,): which of them
-    serve, by default all.
+    serve, by default all; `width`, `slopes`: as for `FitProblem.columns`.
     """
     columns = np.zeros((*problem.table.values.shape, len(z))) if near is None else near.copy()
     wanted = np.full(len(z), near is None)
@@ -343,7 +345,7 @@ def _columns(
         here = wanted[own] if of is firm else wanted & ~in_firm
         if here.any():
             places = None if here.all() else tuple(np.flatnonzero(here).tolist())
-            columns[:, :, own[here]] = of.columns_at(z[own], places, width)
+            columns[:, :, own[here]] = of.columns_at(z[own], places, width, slopes)
     return columns
 
 

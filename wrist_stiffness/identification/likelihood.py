@@ -27,7 +27,7 @@ from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.noise import KNOWN, unstated
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.projection import low_rank
-from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance
+from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance, with_shared
 from wrist_stiffness.inference.smooth import by_session
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.sessions.unit_session import UnitSession
@@ -66,8 +66,8 @@ class WristTable(Whitened):
         )
         if left.covariance is None:
             base = columns if left.common is None else np.concatenate([columns, left.common], 2)
-            usual, width = unstated(left, base, smooth_columns(left))
-            own = own_covariance(left, np.diag(usual))
+            left, usual, width = unstated(left, base, smooth_columns(left))
+            own = own_covariance(left, with_shared(left, np.diag(usual)))
         else:
             # A drift that is stated has columns of its own.
             own = own_covariance(left, left.covariance) - slow[:, :, None] ** 2 * each_its_own

@@ -1,8 +1,10 @@
 """The scatter of a table: from what was repeated, or from what everything together leaves."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from scipy.special import chdtr
 
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.projection import ABSORBED, leading_directions, orthonormal
@@ -16,6 +18,13 @@ FEWEST_REPEATS = 6
 
 POOLED = 10.0
 """Degrees of freedom that the mean over the components of a quantity counts for in each of them."""
+
+BY_CHANCE = 1e-3
+"""Probability of a scatter that small beside a known one, below which that one is not there
+(assumed)."""
+
+LEAST_OWN = 0.01
+"""Share of a unit's scatter that is its own at least, whatever it shares with others (assumed)."""
 
 RICH_SHARE = 0.3
 """The rich model may use up at most this share of the numbers."""
@@ -79,16 +88,36 @@ def in_each_component(features: Sequence[Array | None], observations: Observatio
     return np.asarray(spread.reshape(*observations.values.shape, -1))
 
 
-def unstated(observations: Observations, base: Array, structure: Array) -> tuple[Array, float]:
-    """Return the variance of a unit (m,) that nothing states, and the width of its logarithm.
+def unstated(
+    observations: Observations, base: Array, structure: Array
+) -> tuple[Observations, Array, float]:
+    """Return the scatter of the units where nothing states it.
+
+    What units of a stand share is not in their differences, and known; unless different stands
+    scatter less than it could be by chance.
 
     `observations`, `base`, `structure`: as for `scatter_of`.
+    Returns the units, with what they share if they do, the variance of the rest of one unit (m,),
+    and the width of its logarithm.
     """
     variance, repeats = scatter_of(observations, base, structure)
+    if observations.shared is not None and observations.stand is not None:
+        known = np.mean(np.sum(observations.shared**2, axis=2), axis=0)
+        stand = observations.stand
+        first = np.isin(np.arange(len(stand)), np.unique(stand, return_index=True)[1])
+        apart = (stand < 0) | first
+        square, freedom = _left(observations.take(apart), base[apart], structure[apart, :, :0])
+        on = known > 0.0
+        if chdtr(freedom[on].sum(), np.sum(square[on] / known[on])) < BY_CHANCE:
+            observations = replace(observations, shared=None)
+        else:
+            at_stands = replace(observations, replicate=stand)
+            own, repeats = scatter_of(at_stands, base, structure)
+            variance = own if repeats else np.maximum(variance - known, LEAST_OWN * variance)
     if not repeats:
-        return variance, UNKNOWN
+        return observations, variance, UNKNOWN
     seen = observations.measured.any(axis=0).sum()
-    return variance, max(float(np.sqrt(2.0 / (repeats * seen))), KNOWN)
+    return observations, variance, max(float(np.sqrt(2.0 / (repeats * seen))), KNOWN)
 
 
 def scatter_of(observations: Observations, base: Array, structure: Array) -> tuple[Array, float]:
@@ -105,6 +134,15 @@ def scatter_of(observations: Observations, base: Array, structure: Array) -> tup
     repeated, freedom = replicate_variance(values, columns, observations)
     if freedom >= FEWEST_REPEATS:
         return _shrunk(repeated, freedom, observations), freedom
+    square, left = _left(observations, base, structure)
+    return _shrunk(square / left, float(left.mean()), observations), 0.0
+
+
+def _left(observations: Observations, base: Array, structure: Array) -> tuple[Array, Array]:
+    """Sum of squares that everything together leaves of each component, and its freedom, (m,)."""
+    measured = observations.measured
+    values = np.where(measured, observations.values, 0.0)
+    columns = np.where(measured[:, :, None], np.concatenate([base, structure], axis=2), 0.0)
     count = np.maximum(measured.sum(axis=0), 1)
     size = np.sqrt(np.sum(values**2, axis=0) / count)
     size = np.where(size > 0.0, size, 1.0)
@@ -112,11 +150,11 @@ def scatter_of(observations: Observations, base: Array, structure: Array) -> tup
     basis = rich_basis(flat[:, :p], flat[:, p:], int(measured.sum()))
     target = (values / size).ravel()
     left = (target - basis @ (basis.T @ target)).reshape(measured.shape) * size
-    share = 1.0 - basis.shape[1] / measured.sum()
-    freedom = count * max(share, 1.0 / measured.sum())
-    variance = np.sum(left**2 * measured, axis=0) / freedom
-    least = np.where(variance > 0.0, variance, (1e-9 * size) ** 2)
-    return _shrunk(least, float(freedom.mean()), observations), 0.0
+    # What could explain a component uses up freedom of that one alone.
+    used = np.sum(basis**2, axis=1).reshape(measured.shape)
+    freedom = np.maximum(np.sum((1.0 - used) * measured, axis=0), count / measured.sum())
+    square = np.sum(left**2 * measured, axis=0)
+    return np.where(square > 0.0, square, freedom * (1e-9 * size) ** 2), freedom
 
 
 def _shrunk(variance: Array, freedom: float, observations: Observations) -> Array:

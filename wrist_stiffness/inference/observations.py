@@ -79,7 +79,7 @@ class Observations:
     stand : (n,) array of int, optional
         Units with the same label >= 0 share a part of their scatter.
     shared : (n, m, s) array, optional
-        That part: what each of s standard normal numbers does to a unit; `covariance` holds it.
+        That part: what each of s standard normal numbers does to a unit; a `covariance` holds it.
     common : (n, m, q) array, optional
         What each of q standard normal numbers does to all units: something of the instrument that
         nobody knows.  `covariance` does not hold it.

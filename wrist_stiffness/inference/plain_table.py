@@ -11,7 +11,7 @@ from wrist_stiffness.inference.noise import KNOWN, in_each_component, unstated
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.point import Background
 from wrist_stiffness.inference.projection import orthonormal
-from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance
+from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance, with_shared
 from wrist_stiffness.inference.smooth import alike, by_session, questions, wander
 
 BEYOND = 0.03
@@ -36,8 +36,8 @@ class Table(Whitened):
             asked = [each.features(observations.covariates) for each in self.questions]
             smooth = in_each_component([*asked, self._wander], observations)
             structure = np.concatenate([named, smooth], axis=2)
-            self.variance, self.noise_width = unstated(observations, base, structure)
-            stated = np.diag(self.variance)
+            observations, self.variance, self.noise_width = unstated(observations, base, structure)
+            stated = with_shared(observations, np.diag(self.variance))
         else:
             stated, self.noise_width = observations.covariance, KNOWN
             variances = np.atleast_2d(np.diagonal(stated, axis1=-2, axis2=-1))

@@ -31,6 +31,13 @@ def own_covariance(observations: Observations, covariance: Array) -> Array:
     return np.asarray(whole - shared @ np.swapaxes(shared, 1, 2))
 
 
+def with_shared(observations: Observations, own: Array) -> Array:
+    """Return the covariance of each unit by itself, (n, m, m), from its own part (m, m)."""
+    whole = np.broadcast_to(own, (*observations.values.shape, len(own)))
+    shared = observations.shared
+    return whole if shared is None else whole + shared @ np.swapaxes(shared, 1, 2)
+
+
 class Apart:
     """Brings columns to unit scatter that the units of a stand no longer share.
 

@@ -33,7 +33,7 @@ def only_constants_differ(model: ErrorModel, like: Evaluated) -> bool:
         model.parts is like.situation.parts
         and len(own) == len(changing)
         and all(map(is_, own, changing))
-        and not any(each.stage in FOLLOW_FORCES and not isinstance(each.law, HeldLaw) for each in own)
+        and all(each.stage not in FOLLOW_FORCES or isinstance(each.law, HeldLaw) for each in own)
     )
 
 

@@ -16,13 +16,17 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import cleared
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
-from wrist_stiffness.sessions.units import COUNTS, WINDOW_S, Cut, Labels
+from wrist_stiffness.sessions.units import COUNTS, SPARSE_S, WINDOW_S, Cut, Labels
 
 WANDER = {"um": 0.5e-6, "mdeg": 5e-6}
 """Slow scatter between units that no instrument states [m, rad]: it only sets weights."""
 
 SAME_POSE_COUNTS, SAME_LOAD = 2.5, 0.02
 """Two dwells repeat one condition within so many encoder counts and this share of the load."""
+
+HALF_OF_A_NEW_APPROACH = 1.0
+"""Variance of the difference of two readings of a pose, in that of a hidden count: two new
+approaches leave twice as much, motors at rest the noise alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,17 +91,18 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
         [each.columns_seen(hidden_counts(table, each.cut, each.still.theta)) for each in sessions]
     )
     covariance = _covariance(sessions, counts)
+    stand = stands_of(model, sessions)
     observations = Observations(
         values,
         _covariates(sessions),
         covariance,
         np.concatenate([each.still.time for each in sessions]),
         np.repeat(np.arange(len(sessions)), [len(each) for each in sessions]),
-        _replicates(sessions, table.geometry.limits.encoder_step),
+        _replicates(sessions, table.geometry.limits.encoder_step, stand),
         np.concatenate([each.samples for each in sessions]),
         sessions[0].quantities,
-        stand=stands_of(table, [each.cut for each in sessions]),
-        shared=None if covariance is None else counts,
+        stand=stand,
+        shared=counts,
         common=_common(sessions),
     )
     return Observed(sessions, predicted, replace(observations.take(used), row=None))
@@ -152,11 +157,16 @@ def _covariance(sessions: tuple[UnitSession, ...], counts: Array) -> Array | Non
     return np.asarray(counts @ np.swapaxes(counts, -1, -2) + own[:, :, None] * np.eye(own.shape[1]))
 
 
-def _replicates(sessions: tuple[UnitSession, ...], step: float) -> Labels:
-    """Return the number of the condition that each dwell repeats after a new approach, -1 else."""
-    labels, number = [], 0
+def _replicates(sessions: tuple[UnitSession, ...], step: float, stand: Labels) -> Labels:
+    """Return the number of the condition that each dwell repeats after a new approach, -1 else.
+
+    `stand` (u,): what was read again without a new approach is no repeat.
+    """
+    labels, number, begun = [], 0, 0
     for each in sessions:
         pose, load, dwell = each.still.theta, each.still.load, each.cut.dwell
+        here = stand[begun : begun + len(each)]
+        begun += len(each)
         range_ = np.repeat([np.linalg.norm(load[:, i : i + 3], axis=1).max() for i in (0, 3)], 3)
         own = np.full(len(each), -1)
         for i in np.flatnonzero(dwell):
@@ -165,6 +175,9 @@ def _replicates(sessions: tuple[UnitSession, ...], step: float) -> Labels:
             alike = dwell & (own < 0)
             alike &= (np.abs(pose - pose[i]) <= SAME_POSE_COUNTS * step).all(axis=1)
             alike &= (np.abs(load - load[i]) <= SAME_LOAD * range_ + 1e-12).all(axis=1)
+            rows = np.flatnonzero(alike)
+            first = np.unique(here[rows], return_index=True)[1]
+            alike[rows] = (here[rows] < 0) | np.isin(np.arange(len(rows)), first)
             if alike.sum() > 1:
                 own[alike] = number
                 number += 1
@@ -197,11 +210,13 @@ def counts_known(cut: Cut, step: float) -> Array:
     return np.clip((high - low) / step, 1.0, np.where(cut.dwell[:, None], 1.0, moments))
 
 
-def stands_of(table: Table, cuts: Sequence[Cut]) -> Labels:
+def stands_of(model: ErrorModel, sessions: Sequence[UnitSession]) -> Labels:
     """Return the stand of the motors that each unit shares with others, -1 for none, (u,)."""
     found, first = [], 0
-    for cut in cuts:
-        own = _stands(cut, table.geometry.limits.encoder_step)
+    for each in sessions:
+        own = _stands(each.cut, model.table.geometry.limits.encoder_step, np.inf)
+        if _moved_unseen(model, each, own):
+            own = _stands(each.cut, model.table.geometry.limits.encoder_step, SPARSE_S)
         alike = np.bincount(own[own >= 0], minlength=1)
         alone = (own < 0) | (alike[np.maximum(own, 0)] < 2)
         found.append(np.where(alone, -1, own + first))
@@ -209,15 +224,35 @@ def stands_of(table: Table, cuts: Sequence[Cut]) -> Labels:
     return np.concatenate(found)
 
 
-def _stands(cut: Cut, step: float) -> Labels:
+def _moved_unseen(model: ErrorModel, session: UnitSession, stand: Labels) -> bool:
+    """Tell whether motors moved between readings of one pose that are further apart than a second.
+
+    A new approach hides another part of the counts, so what such readings differ by tells.
+
+    `stand` (u,): in which each unit lies if they did not.
+    """
+    begin, end = session.span.T
+    far = (stand[1:] == stand[:-1]) & (stand[1:] >= 0) & (begin[1:] - end[:-1] > SPARSE_S)
+    if not far.any():
+        return False
+    left = session.residual(model.batch(session.still).measured)
+    hidden = session.columns_seen(hidden_counts(model.table, session.cut, session.still.theta))
+    apart = np.nan_to_num(left[1:] - left[:-1])[far]
+    parts = (np.linalg.pinv(hidden[1:][far]) @ apart[..., None])[..., 0]
+    return bool(np.mean(parts**2) > HALF_OF_A_NEW_APPROACH)
+
+
+def _stands(cut: Cut, step: float, longest_s: float) -> Labels:
     """Return the number of the stand in which each unit lies, -1 in motion, (u,).
 
     A motor that comes to rest shows the count of its rest already, and is not there yet.
+
+    `longest_s`: time without any sample in which it may have moved and come back [s].
     """
     theta, number = cut.block.theta, np.zeros(len(cut.kept), dtype=np.intp)
-    begun = theta[0]
+    begun, late = theta[0], np.diff(cut.block.time, prepend=cut.block.time[0]) > longest_s
     for moment in range(1, len(theta)):
-        moved = bool((np.abs(theta[moment] - begun) > COUNTS * step).any())
+        moved = bool(late[moment] or (np.abs(theta[moment] - begun) > COUNTS * step).any())
         begun = theta[moment] if moved else begun
         number[moment] = number[moment - 1] + moved
     used = cut.unit >= 0

@@ -20,7 +20,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import Gauges
 from wrist_stiffness.sessions.in_pieces import in_pieces
 from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
-from wrist_stiffness.sessions.units import Cut, Labels, Mask, cut
+from wrist_stiffness.sessions.units import FEWEST_IN_DWELL, Cut, Labels, Mask, cut
 
 QUANTITIES = (
     Quantity("s", "um", (0, 1, 2), 1e6),
@@ -275,8 +275,13 @@ def _means(values: Array, label: Labels, units: int) -> tuple[Array, Array]:
 
 
 def _lost(values: Array, parts: Cut) -> Mask:
-    """Tell which measurements lie far from the median of their dwell, (n,)."""
-    rows = np.flatnonzero((parts.label >= 0) & parts.dwell[parts.label])
+    """Tell which measurements lie far from the median of their dwell, (n,).
+
+    Of two nobody can say which one is off.
+    """
+    used = parts.label >= 0
+    many = np.bincount(parts.label[used], minlength=len(parts.dwell)) >= FEWEST_IN_DWELL
+    rows = np.flatnonzero(used & (parts.dwell & many)[parts.label])
     lost = np.zeros(len(values), dtype=bool)
     if len(rows) == 0:
         return lost

@@ -99,14 +99,18 @@ def cut(block: Block, encoder_step: float, measured: Mask) -> Cut:
     step = float(np.median(np.diff(block.time[measured]))) if measured.sum() > 1 else np.inf
     sparse = step > SPARSE_S
     width = max(WINDOW_S, 1.5 * step) if not sparse else 0.0
-    # The first sample of the window before each sample, and the end of the one after.
+    # The first sample of the window before each sample, and the end of the one after; neither
+    # reaches over a time without any.
+    burst: Labels = np.cumsum(np.diff(block.time, prepend=block.time[0]) > SPARSE_S)
     before = np.searchsorted(block.time, block.time - width, side="left")
     after = np.searchsorted(block.time, block.time + width, side="right")
+    before = np.maximum(before, np.searchsorted(burst, burst, side="left"))
+    after = np.minimum(after, np.searchsorted(burst, burst, side="right"))
     turning = _changes(block.theta, before, after, np.full(2, COUNTS * encoder_step), 0.0)
     loading = _changes(block.load, before, after, *_load_tolerance(block.load))
     mean_speed = np.zeros((n, 2)) if sparse else _speed(block, before, after)
     speed = mean_speed if block.theta_dot is None else block.theta_dot
-    stretch, resting = _stretches(turning | loading, block.theta, encoder_step, sparse)
+    stretch, resting = _stretches(turning | loading, burst, block.theta, encoder_step, sparse)
     # Told speeds are those of a moment: as a motion ends, of a count that flickers.
     sense = _last_sign(block.theta, mean_speed, turning, sparse)
     last_turn, last_load = _last(turning, block.time), _last(loading, block.time)
@@ -162,21 +166,27 @@ def _speed(block: Block, first: Labels, end: Labels) -> Array:
 
 
 def _stretches(
-    changing: Mask, theta: Array, encoder_step: float, sparse: bool
+    changing: Mask, burst: Labels, theta: Array, encoder_step: float, sparse: bool
 ) -> tuple[Labels, Mask]:
-    """Return the number of the stretch of rest or of change of each sample, and which rest."""
+    """Return the number of the stretch of rest or of change of each sample, and which rest.
+
+    A burst in which nothing changes is a rest, however few samples it has: a pose that was read
+    once or a few times.
+    """
     n = len(changing)
     if sparse:
         return np.arange(n), np.ones(n, dtype=bool)
-    starts = np.flatnonzero(np.diff(changing, prepend=~changing[0]))
+    new_burst = np.diff(burst, prepend=-1) != 0
+    starts = np.flatnonzero((np.diff(changing, prepend=~changing[0]) != 0) | new_burst)
     stretch = np.repeat(np.arange(len(starts)), np.diff(starts, append=n))
     span = np.maximum.reduceat(theta, starts) - np.minimum.reduceat(theta, starts)
     # A motion slower than the windows can see is no rest.
     creeping = (span > 2.0 * COUNTS * encoder_step).any(axis=1)
     short = np.diff(starts, append=n) < FEWEST_IN_DWELL
+    short &= ~(new_burst[starts] & np.append(new_burst[starts[1:]], True))
     resting = (~changing[starts] & ~creeping & ~short)[stretch]
     starts = np.flatnonzero(np.diff(resting, prepend=~resting[0]) | np.diff(stretch, prepend=-1))
-    # Neighbouring stretches without rest are one; two rests are never neighbours.
+    # Neighbouring stretches without rest are one.
     merged = [0, *(s for s in starts[1:] if resting[s] or resting[s - 1])]
     return np.repeat(np.arange(len(merged)), np.diff(merged, append=n)), resting
 
