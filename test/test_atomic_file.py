@@ -1,6 +1,9 @@
 """A file that the project writes is complete or not there, and never in the place of a device."""
 
 import os
+import signal
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -8,6 +11,7 @@ import pytest
 from wrist_stiffness.atomic_file import replacing, require_room
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.model_file import load_model, save_model
+from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.shipped import shipped_file
 
 
@@ -73,3 +77,39 @@ def test_a_model_that_cannot_be_put_in_its_place_leaves_nothing_beside(tmp_path,
     with pytest.raises(InputError, match="No space left"):
         save_model(model, tmp_path / "m.yaml")
     assert list(tmp_path.iterdir()) == []
+
+
+BEGUN = """
+import sys
+from pathlib import Path
+from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.recording.writer import RecordingWriter
+
+with RecordingWriter(sys.argv[1], overwrite=True), replacing(sys.argv[2]) as written:
+    Path(written).write_text("half")
+    print("begun", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("name", ["a.mcap", "bag"])
+def test_what_a_killed_process_left_is_removed_by_the_next_writer_of_the_same(tmp_path, name):
+    def write():
+        with RecordingWriter(tmp_path / name, overwrite=True), replacing(tmp_path / "m") as written:
+            written.write_text("new")
+
+    command = [sys.executable, "-c", BEGUN, str(tmp_path / name), str(tmp_path / "m")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"begun\n"
+        of_others = tmp_path / ".other.1-1.partial"
+        of_others.touch()
+        begun = {each for each in tmp_path.iterdir() if each != of_others}
+        assert len(begun) == 2
+        write()
+        assert begun < set(tmp_path.iterdir())
+        other.send_signal(signal.SIGKILL)
+    # What was live comes only once.
+    with RecordingWriter(tmp_path / name, overwrite=True, keep_partial=True):
+        assert begun < set(tmp_path.iterdir())
+    write()
+    assert set(tmp_path.iterdir()) == {tmp_path / name, tmp_path / "m", of_others}

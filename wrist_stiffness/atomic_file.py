@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from socket import gethostname
 from tempfile import TemporaryFile
+from zlib import crc32
 
 from wrist_stiffness.errors import InputError, WristError
 
@@ -58,10 +62,51 @@ def replacing(path: str | Path) -> Iterator[Path]:
         yield target
         return
     target = target.resolve()
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    temporary = partial_of(target)
+    remove_orphans(target)
     try:
         yield temporary
         os.replace(temporary, target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def partial_of(target: Path) -> Path:
+    """Return the hidden neighbour of a file or folder that this process writes in its place."""
+    return target.parent / f".{target.name}.{_numbering()}-{os.getpid()}.partial"
+
+
+def remove_orphans(target: Path) -> None:
+    """Remove what processes that live no more left where they wrote a target: they were killed."""
+    name = re.compile(rf"\.{re.escape(target.name)}\.{_numbering()}-(\d{{1,7}})\.partial")
+    with suppress(OSError):
+        for each in target.parent.iterdir():
+            found = name.fullmatch(each.name)
+            if found and not _lives(int(found[1])):
+                remove(each)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, or a folder with all that is in it; there may be none."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _numbering() -> str:
+    """Return what tells apart where processes are numbered: other hosts, and containers of one."""
+    space = Path("/proc/self/ns/pid")
+    number = space.stat().st_ino if space.exists() else 0
+    return f"{crc32(f'{gethostname()} {number}'.encode()):08x}"
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # It is somebody else's.
+        return True
+    return True

@@ -130,6 +130,30 @@ def test_a_formula_may_divide_by_its_parameter(model, extend_by):
     assert {each.key for each in found.extension.own} == {"lean_mdeg", "far_deg"}
 
 
+@pytest.mark.parametrize(
+    ("expression", "key", "typed", "true"),
+    [
+        ("lift_um * max(fz, 0) ** power", "power", 1.0, 2.0),
+        ("lift_um * lag(fz, tau_s)", "tau_s", 2.0, 5.0),
+        ("lift_um * play(fz, slack_N)", "slack_N", 0.5, 0.4),
+        # Most multiples of what was typed are above the driest day, and steps lead there.
+        ("lift_um * sqrt(humidity - dry)", "dry", 25.0, 30.0),
+        # Its first value, 1, is one for which it is undefined.
+        ("lift_um * log(wet - humidity)", "wet", 70.0, 65.0),
+    ],
+)
+def test_values_for_which_a_formula_is_undefined_are_not_tried(
+    model, extend_by, expression, key, typed, true
+):
+    up = [0, 0, 1, 0, 0, 0]
+    addition = FormulaEffect("plate", "frame", up, expression, {key: typed})
+    planted = addition.effect(["humidity"]).with_values({"lift_um": 20.0, key: true})
+    found, _ = extend_by(addition, session_of(model, planted))
+    for own in found.extension.own:
+        assert own.value == pytest.approx({"lift_um": 20.0, key: true}[own.key], abs=3 * own.sigma)
+        assert own.sigma < 0.4 * own.value
+
+
 def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_path):
     (tmp_path / "own.py").write_text(OWN)
     addition = own_effect(f"{tmp_path}/own.py:Bow@platform")
@@ -190,6 +214,10 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
         (
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "sin(theta_1)", {}),
             "has no parameter to fit",
+        ),
+        (
+            FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * lag(fz, b_s)", {"b_s": -1}),
+            r"lag\(fz, b_s\) has no finite value for b_s = -1, fz = \S+ 0.000 s after the start",
         ),
         (
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg", {"b_mdeg": 1.0}),

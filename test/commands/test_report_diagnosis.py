@@ -88,7 +88,7 @@ PROVENANCE = Provenance("wrist-stiffness diagnose", "2026-01-01", {"m": "a"}, {"
 class Units:
     """What is asked of a session beside its table: the scatter of one measurement."""
 
-    wander, white = np.zeros(6), np.repeat([1e-6, 1e-4], 3)
+    drift, white = np.zeros(6), np.repeat([1e-6, 1e-4], 3)
 
     def __init__(self, n):
         self.measured = np.ones(n, dtype=bool)

@@ -157,7 +157,7 @@ class Units:
     """What is asked of a session beside its table: the scatter of one measurement."""
 
     def __init__(self, n):
-        self.wander, self.white = np.zeros(6), np.repeat([1e-6, 1e-4], 3)
+        self.drift, self.white = np.zeros(6), np.repeat([1e-6, 1e-4], 3)
         self.measured, self._n = np.ones(n, dtype=bool), n
 
     def __len__(self):

@@ -267,3 +267,14 @@ def test_what_is_attainable_is_the_evidence_of_noise_alone(rng):
     assert best.attainable == pytest.approx(best.log, abs=1e-9)
     at = Evidence(replace(point, left=20.0 * point.left), ground, np.full(2, 3.0), 2.0)
     assert at.attainable == pytest.approx(best.log, abs=1e-9)
+
+
+def test_what_only_a_prior_tells_is_as_uncertain_as_that_far_above_the_noise(rng):
+    """Two columns do the same, a billion times the noise: only their sum is measured."""
+    point, ground = linear(rng)
+    weight = 1e-3
+    alike = np.repeat(1e9 * point.columns[:, :1], 2, axis=1)
+    point = replace(point, columns=alike, weight=np.full(2, weight))
+    found = Evidence(point, ground, np.array([0.5, 0.5]), 1.0).covariance_of_fit
+    expected = np.array([[0.5, -0.5], [-0.5, 0.5]]) / weight**2
+    assert found == pytest.approx(expected, rel=1e-3)

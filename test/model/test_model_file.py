@@ -267,6 +267,10 @@ LINEARISED = """def linearised(self, place, signals):
             "stage 'geometri' of Twist is not",
         ),
         (OWN.replace("return (Parameter(", "return (Parametre("), "NameError: name 'Parametre'"),
+        (
+            OWN.replace("return (Parameter(", "return ()\n        return (Parameter("),
+            "own.py:Twist: Twist has no parameter to fit at platform; multiply what it does by one",
+        ),
         (OWN.replace("10.0, 1.0)", "10.0, 0.0)"), "turn_mdeg: scale = 0.0 is not above 0"),
         (
             OWN.replace("10.0, 1.0)", "10.0, 1.0, grid=(2, 1))"),

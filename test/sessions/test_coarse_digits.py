@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wrist_stiffness.comparing.compare import compare_models
+from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.sessions.observing import observe
 from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.sessions.unit_session import as_units
@@ -50,3 +52,31 @@ def test_units_of_an_instrument_without_scatter_can_be_weighed(model, session):
         shift[still.label == unit] = shift[still.label == unit][0]
     observed = observe(model, [replace(session, shift=shift)])
     np.linalg.cholesky(observed.observations.covariance)
+
+
+@pytest.fixture(scope="module")
+def repeated(session):
+    """A platform that carries loads at one pose; the instrument always shows the same turn."""
+    still, noise = session.take(slice(0, 6000, 10)), np.random.default_rng(0)
+    theta = np.broadcast_to(still.block.theta[0], still.block.theta.shape)
+    return replace(
+        still,
+        block=replace(still.block, theta=theta, theta_dot=np.zeros(theta.shape)),
+        shift=still.shift[0] + noise.normal(0.0, 0.7e-6, still.shift.shape),
+        rotation=np.broadcast_to(still.rotation[0], still.rotation.shape),
+        covariance=None,
+    )
+
+
+def test_poses_that_repeat_exactly_can_be_judged(model, repeated):
+    still = np.broadcast_to(repeated.shift[0], repeated.shift.shape)
+    repeated = replace(repeated, shift=still)
+    (found,) = compare_models([("drawn", model)], [repeated]).models
+    hidden = as_units(model, repeated).digits ** 2
+    assert (found.explained.table.variance >= 0.999 * hidden).all()
+    assert all(np.isfinite(each) and each > 0.0 for each in found.explained.error.values())
+
+
+def test_poses_that_repeat_exactly_can_be_fitted_to(model, repeated):
+    found = calibrate(model, [repeated])
+    assert all(np.isfinite(each.sigma) and each.sigma > 0.0 for each in found.parameters)

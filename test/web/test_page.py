@@ -192,6 +192,36 @@ def test_only_what_was_measured_is_offered(address, browser, pictures):
     hand.done()
 
 
+def test_whoever_leaves_an_analysis_is_asked_first(address, browser, pictures):
+    hand = Hand(browser, address[0], pictures)
+
+    def reload():
+        hand.page.evaluate("setTimeout(() => location.reload())")
+
+    def stays():
+        hand.page.wait_for_selector("#busy[data-loses=true]", state="attached")
+        with hand.page.expect_event("dialog") as asked:
+            reload()
+        assert asked.value.type == "beforeunload"
+        asked.value.dismiss()
+
+    hand.open("monday.mcap")
+    stays()
+    assert "1.5 min" in hand.text()
+    hand.panel("Models")
+    hand.asks("Export")
+    hand.page.wait_for_selector("#busy[data-loses=false]", state="attached")
+    hand.panel("Missing")
+    hand.click("What is missing?")
+    hand.page.wait_for_selector("#busy", state="visible")
+    stays()
+    hand.press("Escape")
+    hand.page.wait_for_selector("#busy[data-loses=false]", state="attached")
+    reload()
+    hand.page.wait_for_selector("text=nothing opened")
+    hand.done()
+
+
 def test_a_bad_file_gets_a_sentence_and_a_good_one_arrives(address, browser, pictures):
     url, folder = address
     hand = Hand(browser, url, pictures)

@@ -24,6 +24,7 @@ from wrist_stiffness.inference.outliers import OUTLIER_LIMIT, lost_units
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.sessions.columns import SessionModel
 from wrist_stiffness.sessions.unit_session import UnitSession
 from wrist_stiffness.sessions.units import Mask
@@ -304,8 +305,11 @@ def _descended(
         size = 1.0
         while True:
             trial = np.clip(z + size * step, lower, upper)
-            tried = problem.residual(trial)
-            after = _cost(problem.whiten(tried), trial, weights, scale)
+            try:
+                tried = problem.residual(trial)
+                after = _cost(problem.whiten(tried), trial, weights, scale)
+            except UndefinedFormulaError:
+                after = np.inf
             if after < before or size <= SMALLEST_STEP:
                 break
             size /= 2.0

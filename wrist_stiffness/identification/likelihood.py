@@ -62,7 +62,7 @@ class WristTable(Whitened):
         self.lost = lost
         each_its_own = np.eye(left.n_components)
         slow = np.concatenate(
-            [np.broadcast_to(s.wander, (len(s), len(s.wander)))[s.measured] for s in sessions]
+            [np.broadcast_to(s.drift, (len(s), len(s.drift)))[s.measured] for s in sessions]
         )
         if left.covariance is None:
             base = columns if left.common is None else np.concatenate([columns, left.common], 2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from wrist_stiffness.inference.shared import Apart, own_covariance, with_shared
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.parameters import Parameter
 from wrist_stiffness.sessions.columns import SessionModel
 from wrist_stiffness.sessions.observing import tabulate, usual_wander
@@ -243,7 +244,8 @@ class FitProblem:
     ) -> Array:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
-        By one-sided differences, away from the nearer bound.  Effects with a past do beside another
+        By one-sided differences, away from the nearer bound, and from where a formula is undefined.
+        Effects with a past do beside another
         parameter what they do beside this one: so only their own columns follow the path anew.
 
         `z` (p,): steps from the prior means; `places`: which unknowns are asked for; all by
@@ -271,7 +273,11 @@ class FitProblem:
         """Return the change by a step of some unknowns of what twists (t, u, 6) are shown as."""
         blocks = []
         for number, session in enumerate(self.sessions):
-            twists, moved, step = self._trials(number, z, asked, width, slopes)
+            asking = partial(self._trials, number, z, asked, width, slopes)
+            try:
+                twists, moved, step = asking()
+            except UndefinedFormulaError:
+                twists, moved, step = asking(upwards=False)
             first, *others = shown(session, np.stack(twists))
             block = np.zeros((*first.shape, len(z)))
             for place, other in zip(moved, others, strict=True):
@@ -280,16 +286,25 @@ class FitProblem:
         return self.rows(blocks)
 
     def _trials(
-        self, number: int, z: Array, asked: list[int], width: float, slopes: bool
+        self,
+        number: int,
+        z: Array,
+        asked: list[int],
+        width: float,
+        slopes: bool,
+        upwards: bool = True,
     ) -> tuple[list[Array], list[int], Array]:
-        """Return a session's predicted twists (u, 6), and those with a step of some unknowns."""
+        """Return a session's predicted twists (u, 6), and those with a step of some unknowns.
+
+        `upwards`: which way it goes where there is room on both sides.
+        """
         model = self._models[number]
         values = self._values(z, number)
         effects = self._with_values(values)
         whole = (*self.model.effects, *effects)
         held = model.held(whole)
         up, down = (np.minimum(width, room) for room in (self.bounds[1] - z, z - self.bounds[0]))
-        step = np.where(up >= down, up, -down)
+        step = np.where((up > down) | (upwards & (up == down)), up, -down)
         moved, trials = [], [_as_held(whole, held)]
         for place in asked:
             unknown = self.unknowns[place]

@@ -23,6 +23,7 @@ from wrist_stiffness.inference.point import Point
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.parameters import Estimate, Parameter
 from wrist_stiffness.sessions.observing import without_mounting
@@ -320,7 +321,10 @@ class WristFit:
         before = found.cost(self.point)
         for halvings in range(MOST_HALVINGS):
             z = self.base.z + 0.5**halvings * step
-            base = replace(self.base, z=z, residual=self.base.problem.residual(z))
+            try:
+                base = replace(self.base, z=z, residual=self.base.problem.residual(z))
+            except UndefinedFormulaError:
+                continue
             tried = replace(self, base=base)
             if found.cost(tried.point) < before:
                 return tried

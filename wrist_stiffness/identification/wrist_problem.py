@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice, product
 
@@ -34,6 +35,7 @@ from wrist_stiffness.inference.search import Ranked, Trial, ranked
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 LEAVES_MUCH, HELPS = 1.5, 0.8
@@ -130,7 +132,7 @@ class WristProblem:
         if candidate not in self._near:
             begun = candidate.effect(ranked.z, ranked.shape)
             if begun.law.state_is_a_guess:
-                begun = _best_of(fit.base, self.about(fit), begun, _plays(begun))
+                begun = next(_from_best(fit.base, self.about(fit), begun, _plays(begun)))
             self._near[candidate] = self.beside(fit, begun)
         return self._near[candidate]
 
@@ -167,8 +169,11 @@ class WristProblem:
     def _extend(self, fit: WristFit, effect: Effect) -> WristFit:
         point = self.about(fit)
         if any(not np.isfinite(parameter.scale) for parameter in effect.parameters):
-            start = _best_of(fit.base, point, effect, _multiples(effect))
-            return self._fitted([*fit.base.beyond().values(), start], fit.base)
+            others = list(fit.base.beyond().values())
+            for start in _from_best(fit.base, point, effect, _multiples(effect)):
+                with suppress(UndefinedFormulaError):
+                    return self._fitted([*others, start], fit.base)
+            return self._fitted([*others, effect], fit.base)
         (candidate,) = wrist_candidates(point, [(effect.law, effect.component)])
         (best,) = ranked(evidence(fit.point, self.background), [self._trial(candidate)])
         found = self._added(fit, best, candidate)
@@ -242,13 +247,14 @@ def _multiples(effect: Effect) -> list[dict[str, float]]:
     ]
 
 
-def _best_of(
+def _from_best(
     fitted: BaseFit, point: WristPoint, effect: Effect, tried: Sequence[dict[str, float]]
-) -> Effect:
-    """Return an effect at the values that explain most beside a base that follows.
+) -> Iterator[Effect]:
+    """Give an effect at values from those on that explain most beside a base that follows.
 
     `fitted`: what everything else explains, which to first order follows; `point`: the same, for
-    trials; `tried`: its values, each brought within its bounds.
+    trials; `tried`: its values, each brought within its bounds; those for which a formula is
+    undefined are left out.
     """
     # Weights where there is no prior are tiny: QR keeps them apart from rounding.
     root, weights = np.sqrt(max(1.0, fitted.variance)), fitted.problem.weights
@@ -259,9 +265,24 @@ def _best_of(
         rows = np.concatenate([white / root, offset])
         return np.asarray(rows - basis @ (basis.T @ rows))
 
-    changes = point.changes([(effect.law, effect.component, each) for each in tried])
-    white = whiten(np.moveaxis(changes, 0, -1))
-    explained = beyond(white, np.zeros((len(weights), len(tried))))
+    found = _defined(point, effect, tried)
+    if not found:
+        return
+    white = whiten(np.stack([change for _, change in found], axis=-1))
+    explained = beyond(white, np.zeros((len(weights), len(found))))
     left = beyond(whiten(fitted.residual), weights * fitted.z)[:, None] - explained
-    best = tried[int(np.argmin(np.sum(left**2, axis=0)))]
-    return effect_at(effect.law, effect.component, best)
+    for place in np.argsort(np.sum(left**2, axis=0), kind="stable"):
+        yield effect_at(effect.law, effect.component, found[place][0])
+
+
+def _defined(
+    point: WristPoint, effect: Effect, tried: Sequence[dict[str, float]]
+) -> list[tuple[dict[str, float], Array]]:
+    """Return those of the values for which an effect is defined, each with its change (u, m)."""
+    try:
+        changes = point.changes([(effect.law, effect.component, each) for each in tried])
+    except UndefinedFormulaError:
+        half = len(tried) // 2
+        parts = [tried[:half], tried[half:]] if half else []
+        return [each for part in parts for each in _defined(point, effect, part)]
+    return list(zip(tried, changes, strict=True))

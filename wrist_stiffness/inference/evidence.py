@@ -184,18 +184,21 @@ class Evidence:
         What is known of them once all amplitudes are found, a discrepancy included (White 1980).
         """
         p, known = len(self.point.z), known_noise(self.point, self.background)
-        named = self.point.columns
+        named, prior = self.point.columns, np.diag(np.sqrt(self.precision[:p]))
         beside = np.hstack([self.point.inexact, self.background.columns])
-        # Columns by the inverse of the known covariance (Woodbury).
         own = np.hstack([known.point.inexact, known.background.columns])
+        # Squares of what lies far above the noise would drown the priors: so their roots are taken.
+        apart = np.diag(np.sqrt(np.concatenate([known.precision[p:], self.precision[:p]])))
+        rows = np.vstack([np.hstack([own, named]), apart])
+        q = own.shape[1]
+        root = np.asarray(np.linalg.qr(rows, mode="r"))[q:, q:]
+        # Columns by the inverse of the known covariance (Woodbury).
         inner = own.T @ own + np.diag(known.precision[p:])
         weighted = named - own @ np.linalg.solve(inner, own.T @ named)
-        prior = np.diag(self.precision[:p])
-        bread = np.linalg.inv(named.T @ weighted + prior)
-        mixed = weighted.T @ beside
-        filling = self.excess * weighted.T @ weighted + prior
-        filling += (mixed / self.precision[p:]) @ mixed.T
-        return np.asarray(bread @ filling @ bread)
+        mixed = beside.T @ weighted / np.sqrt(self.precision[p:])[:, None]
+        filling = np.vstack([np.sqrt(self.excess) * weighted, prior, mixed])
+        half = solve_triangular(root, solve_triangular(root, filling.T, trans="T"))
+        return np.asarray(half @ half.T)
 
     @property
     def step(self) -> Array:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.contribution import Contribution
 from wrist_stiffness.model.evaluation import (
@@ -121,15 +120,15 @@ def predicted(
     `block`: n samples; `accepted` (n,): those inside the table's domain and load range; the
     effects' memory passes over the rest; `near`: `guesses` of an earlier prediction of this block;
     `recent`: of this block; then `models` begin with what it says is like the first; `slopes`: as
-    for `evaluate_beside`.  Raises
-    `InputError` if a user's formula has no finite value; the message says how long after the first
-    sample.
+    for `evaluate_beside`.  Raises `UndefinedFormulaError` if a user's formula has no finite value;
+    the message says how long after the first sample.
     """
     try:
         return _predicted(models, block, accepted, near, recent or Recent(), slopes)
     except UndefinedFormulaError as error:
         after = error.time_s - float(block.time[0])
-        raise InputError(f"{error}, {after:.3f} s after the start") from error
+        told = f"{error}, {after:.3f} s after the start"
+        raise UndefinedFormulaError(told, error.time_s) from error
 
 
 def _predicted(

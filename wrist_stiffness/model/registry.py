@@ -131,7 +131,13 @@ def _require_parameters(law: Law, place: str) -> None:
     for component in law.places:
         asked = "parameters"
         try:
-            for each in law.parameters(component):
+            parameters = law.parameters(component)
+            if not parameters:
+                raise InputError(
+                    f"{type(law).__name__} has no parameter to fit at {component}; multiply what "
+                    "it does by one"
+                )
+            for each in parameters:
                 if not each.scale > 0.0:
                     raise InputError(f"{each.key}: scale = {each.scale} is not above 0")
             asked = "linearised"

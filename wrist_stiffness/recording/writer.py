@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EEXIST
@@ -15,6 +14,7 @@ from typing import Any, BinaryIO
 
 import yaml
 
+from wrist_stiffness.atomic_file import partial_of, remove, remove_orphans
 from wrist_stiffness.errors import RecordingError
 from wrist_stiffness.recording.bag_folder import METADATA_FILE
 from wrist_stiffness.recording.cdr import encode
@@ -45,8 +45,9 @@ class RecordingWriter:
 
     Messages go to a hidden neighbour of the path, which takes the final name when the ``with``
     block ends without an exception; otherwise it is removed and nothing is left, unless
-    `keep_partial` says so.  Memory is bounded by one chunk.  The same messages give the same bytes:
-    nothing in the file depends on clock, path or host.
+    `keep_partial` says so; what a killed process left there goes as well.  Memory is bounded by one
+    chunk.  The same messages give the same bytes: nothing in the file depends on clock, path or
+    host.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ class RecordingWriter:
         Replace an existing recording.  Anything else under that name is never replaced.
     keep_partial : bool
         Keep what was written when the disk refuses more, as `NAME.partial` or `NAME.partial.mcap`:
-        what was live comes only once.
+        what was live comes only once.  Of an earlier one that was killed nothing is removed then.
 
     Raises
     ------
@@ -71,7 +72,7 @@ class RecordingWriter:
         self._overwrite = overwrite
         self._keep_partial = keep_partial
         self._is_folder = self.path.suffix != ".mcap"
-        self._partial = self.path.parent / f".{self.path.name}.{os.getpid()}.partial"
+        self._partial = partial_of(self.path)
         self._stream: BinaryIO | None = None
         self._refused: OSError | None = None
         self._channels: dict[str, tuple[Channel, int]] = {}
@@ -79,6 +80,8 @@ class RecordingWriter:
     def __enter__(self) -> RecordingWriter:
         """Begin the recording under its temporary name."""
         self.check_target()
+        if not self._keep_partial:
+            remove_orphans(self.path)
         try:
             if self._is_folder:
                 self._partial.mkdir()
@@ -210,7 +213,7 @@ class RecordingWriter:
                 kept = self._keep()
             # A disk that is read-only refuses to remove even what is not there.
             with suppress(OSError):
-                _remove(self._partial)
+                remove(self._partial)
         told = exception is None or exception.__cause__ is self._refused
         if self._refused is not None and told:
             raise self._refusal(self._refused, kept) from self._refused
@@ -261,7 +264,7 @@ class RecordingWriter:
             except OSError:
                 replaced.rename(self.path)
                 raise
-            _remove(replaced)
+            remove(replaced)
         else:
             os.replace(self._partial, self.path)
 
@@ -320,10 +323,3 @@ def is_only_recording(path: Path) -> bool:
     if path.is_file():
         return True
     return all(entry.name == METADATA_FILE or entry.suffix == ".mcap" for entry in path.iterdir())
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from wrist_stiffness import topics
+from wrist_stiffness.atomic_file import partial_of, remove_orphans
 from wrist_stiffness.commands.plan import COLUMNS, plan_rows
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.errors import InputError
@@ -44,7 +45,8 @@ def write_plan(table: Table, timeline: Timeline, text: str, folder: str | Path) 
     """
     folder = Path(folder)
     require_new_folder(folder)
-    partial = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    partial = partial_of(folder)
+    remove_orphans(folder)
     try:
         partial.mkdir()
         with (partial / "plan.csv").open("w", newline="") as stream:

@@ -15,6 +15,7 @@ from wrist_stiffness.model.batch import Recent
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate
+from wrist_stiffness.model.formula import UndefinedFormulaError
 from wrist_stiffness.model.held import HeldLaw
 from wrist_stiffness.sessions.unit_session import UnitSession
 
@@ -67,15 +68,17 @@ class SessionModel:
         """Tell whether earlier moments decide what an effect does.
 
         The law is asked with its first values: with no play there is nothing to seek, so play has
-        no past.
+        no past.  A formula may be undefined there; then it is asked with those of the effect.
         """
         if isinstance(effect.law, HeldLaw):
             return True
         known, asked = self.session.known, (effect.law, effect.component)
         if asked not in known:
             first = self.session.block.take(slice(0, 1))
-            usual = Effect(*asked)
-            memory = evaluate(self.model.with_effects(usual), first, None).memory
+            try:
+                memory = evaluate(self.model.with_effects(Effect(*asked)), first, None).memory
+            except UndefinedFormulaError:
+                memory = evaluate(self.model.with_effects(effect), first, None).memory
             known[asked] = memory.states[0] is not None
         return bool(known[asked])
 

@@ -57,9 +57,10 @@ class UnitSession:
     samples: Array  # (u,), measurements in each mean
     lost: int  # measurements left out as lost beams
     white: Array  # (m,), scatter of one measurement, NaN where it is not known [m, rad]
-    # (m,), slow scatter beside it, which no mean over a dwell makes smaller: what the instrument
-    # states beyond the white scatter, or what its digits hide where they hide that one [m, rad]
-    wander: Array
+    # (m,), what the instrument states beyond all that: it drifts slowly [m, rad]
+    drift: Array
+    # (m,), what its digits hide, where they hide the white scatter; else 0 [m, rad]
+    digits: Array
     gauges: Gauges | None = None  # what read them, in place of a sensor of poses: m is K, else 6
 
     def __len__(self) -> int:
@@ -77,6 +78,11 @@ class UnitSession:
         if self.gauges is None:
             return "poses"
         return f"gauges ({', '.join(each.name for each in self.gauges.members)})"
+
+    @property
+    def wander(self) -> Array:
+        """Scatter beside the white one that no mean over a dwell makes smaller, (m,) [m, rad]."""
+        return np.hypot(self.drift, self.digits)
 
     @cached_property
     def measured(self) -> Mask:
@@ -250,8 +256,9 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
     mean, count = _means(values, label, units)
     steps = _steps(values, label, parts)
     white = _white(steps, stated)
-    beside = np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2, 0.0))
     quantities = QUANTITIES if session.gauges is None else session.gauges.quantities
+    digits = np.where(white == 0.0, _rounding(steps, quantities), 0.0)
+    drift = np.sqrt(np.maximum(stated - np.nan_to_num(white) ** 2 - digits**2, 0.0))
     return UnitSession(
         session.name,
         parts,
@@ -259,7 +266,8 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         np.maximum(count.max(axis=1), 1.0),
         int(lost.sum()),
         white,
-        np.maximum(beside, np.where(white == 0.0, _rounding(steps, quantities), 0.0)),
+        drift,
+        digits,
         session.gauges,
     )
 

@@ -41,6 +41,13 @@ new MutationObserver(() => {
 """
 """What is drawn anew keeps the keyboard's focus; where it is gone, what is chosen takes it."""
 
+LEAVE = """
+addEventListener("beforeunload", event => {
+  if (document.getElementById("busy").dataset.loses === "true") event.preventDefault();
+});
+"""
+"""Whoever reloads or closes the page is asked first where that loses something."""
+
 START = (
     "Open a recording of your wrist, or an example. The workbench registers the instrument, "
     "calibrates the model and shows where its error remains.",
@@ -55,7 +62,7 @@ def build_page(workspace: Workspace, largest: int) -> None:
     """Build the page of one tab; `largest`: of an upload [bytes]."""
     tab = Tab(workspace)
     ui.add_css(STYLE)
-    ui.add_body_html(f"<script>{FOCUS}</script>")
+    ui.add_body_html(f"<script>{FOCUS}{LEAVE}</script>")
     ui.colors(primary="#0072b2")
     with ui.row().classes("w-full items-center no-wrap px-3 py-1 gap-4 bg-white shadow-1"):
         ui.label("Wrist workbench").classes("text-lg font-bold whitespace-nowrap")
@@ -72,7 +79,8 @@ def build_page(workspace: Workspace, largest: int) -> None:
 
     def progress() -> None:
         bar.set_value(tab.done / tab.total if tab.total else 0.0)
-        status.props(f"data-calls={tab.calls}")
+        loses = "true" if tab.busy or tab.unsaved else "false"
+        status.props(f"data-calls={tab.calls} data-loses={loses}")
 
     ui.timer(0.2, progress)
     with ui.row().classes("w-full no-wrap gap-2 p-2 items-stretch"):

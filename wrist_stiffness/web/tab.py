@@ -27,6 +27,9 @@ from wrist_stiffness.web.workspace import Workspace
 
 DEPENDS, VERSIONS = "Depends on", "Versions"
 
+FOUND = {"rows", "diagnosis", "written"}
+"""What is lost with the page, and what has saved it."""
+
 ASIDE = 99.0
 """Percentile of the errors at which the scale of colours ends: one wild unit greys no others."""
 
@@ -94,6 +97,7 @@ class Tab:
         self.covariates: tuple[str, ...] = ()
         self.planned = "", ""
         self.written: tuple[tuple[str, str], ...] = ()
+        self.unsaved = False
         self.version = 0
         self.against: int | None = None
         self.chosen: Mask | None = None
@@ -144,6 +148,8 @@ class Tab:
         self.done, self.total = done, total
 
     def _take(self, changes: Changes) -> None:
+        if FOUND & changes.keys():
+            self.unsaved = "written" not in changes
         view, told = changes.pop("view", None), changes.pop("depends_on", None)
         for name, value in changes.items():
             setattr(self, name, value)
