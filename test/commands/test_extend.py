@@ -121,6 +121,16 @@ def test_a_formula_is_fitted_written_and_read_again(model, extend_by):
     assert again.estimates["sag_mdeg"].sigma == pytest.approx(size.sigma)
 
 
+@pytest.mark.parametrize(("text", "told"), [("a_um * (time + 1e4)", True), ("a_um * W_fz", False)])
+def test_what_the_set_up_may_hide_is_told(model, extend_by, text, told):
+    """A lift that never changes much: where the instrument stands takes all of it up."""
+    addition = FormulaEffect("lift", "frame", [0, 0, 1, 0, 0, 0], text, {"a_um": 1.0})
+    true = addition.effect([]).with_values({"a_um": 1e-4})
+    found, _ = extend_by(addition, replace(session_of(model, true), notes={}))
+    said = [line for line in extension_lines(found) if "do not tell it from the set-up" in line]
+    assert bool(said) == told
+
+
 def test_a_formula_may_divide_by_its_parameter(model, extend_by):
     addition = FormulaEffect(
         "lean", "link_2", [0, 0, 0, 1, 0, 0], "lean_mdeg * theta_1 / far_deg", {"far_deg": 20.0}

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.extend import direction_of
-from wrist_stiffness.identification import wrist_diagnosis, wrist_problem
+from wrist_stiffness.identification import proposing, wrist_diagnosis, wrist_problem
 from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.identification.proposal import Proposals, twins
 from wrist_stiffness.identification.proposing import propose
@@ -71,6 +71,15 @@ def test_a_time_that_is_over_before_every_law_was_judged_is_said(model, day):
     found = propose(problem, problem.begin(), seconds=1e-3)
     assert not found.complete
     assert found.lines()[-1].startswith("The time was over")
+
+
+def test_a_law_that_explains_nothing_is_not_proposed(model, day, monkeypatch):
+    session = planted(
+        model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * lag(clamp_bar, 4)", lift_um=0.8
+    )
+    real = proposing._proposal
+    monkeypatch.setattr(proposing, "_proposal", lambda *a: replace(real(*a), explains=-0.18))
+    assert proposed(model, session).terms == ()
 
 
 def test_a_late_clamp_under_the_frame_is_found_and_can_be_added(model, day):

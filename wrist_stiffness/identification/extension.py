@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.base_fit import fit_base
 from wrist_stiffness.identification.calibration import said_calibrated, told_model
@@ -26,7 +28,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import AXES, TOLERATED
-from wrist_stiffness.sessions.unit_session import UnitSession, all_units
+from wrist_stiffness.sessions.unit_session import QUANTITIES, UnitSession, all_units
 
 STEPS = 5
 """That are told of."""
@@ -108,6 +110,17 @@ class Extension:
         ]
         return tuple((a, b) for _, a, b in sorted(moved, key=lambda each: -each[0]))
 
+    @cached_property
+    def _unsure_by(self) -> dict[str, float]:
+        """One standard uncertainty of what the effect does to the platform, RMS by quantity."""
+        fit, at = self.fit, self.fit.places[self.effect.name]
+        rows = fit.problem.twists(fit.z)[:, :, at]
+        variance = np.einsum("uij,jk,uik->ui", rows, fit.covariance[np.ix_(at, at)], rows)
+        mean = np.maximum(variance.mean(axis=0), 0.0)
+        return {
+            q.key: float(np.sqrt(mean[list(q.components)].sum())) * q.per_si for q in QUANTITIES
+        }
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """What speaks against the effect, a sentence each."""
@@ -132,6 +145,15 @@ class Extension:
         told = [each for each in self.own if each.excited]
         if told and all(abs(each.value) < SIGNIFICANT * each.sigma for each in told):
             out.append("none of its parameters differs from zero by more than chance")
+        error = self.before.rms(self.quantities)
+        for quantity in QUANTITIES:
+            sigma, whole = self._unsure_by[quantity.key], error.get(quantity.key, np.inf)
+            if sigma > whole:
+                out.append(
+                    f"it may move the platform by {sigma:.3g} {quantity.unit} more or less, where "
+                    f"the whole error is {whole:.3g}: these recordings do not tell it from the "
+                    "set-up, and nodes would apply all of it"
+                )
         if refuted(self.before, self.after):
             out.append("the error on the unseen part GROWS: leave this effect out")
         elif not refuted(self.after, self.before):

@@ -113,7 +113,10 @@ def propose(
             break
         # A second one is no surer than the first, beside which it was found.
         before = terms[0].probability if terms else 1.0
-        terms.append(_proposal(found[0], before * float(chances[0]), base))
+        law = _proposal(found[0], before * float(chances[0]), base)
+        if law.explains <= 0.0:
+            break
+        terms.append(law)
         if len(terms) < MOST_TERMS:
             # Tolerances that had given way to the first law find back.
             try:
