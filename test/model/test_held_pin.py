@@ -11,7 +11,7 @@ from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.law import Law
-from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS
+from wrist_stiffness.model.pin_play import SMALL_FORCE, WALL
 from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.rubbing import Bristles, dragged, slip
 from wrist_stiffness.simulation.laws.bushing import play
@@ -95,7 +95,7 @@ def test_a_held_pin_is_in_balance(model, make, monkeypatch, loose, joint):
     moved, force = ends_of(result, loose, 1)
     size = np.linalg.norm(moved, axis=-1, keepdims=True)
     centring = SMALL_FORCE / 2.5e-6
-    wall = (centring + WALLS[-1] * np.maximum(1.0 - 2.5e-6 / size, 0.0)) * moved
+    wall = (centring + WALL * np.maximum(1.0 - 2.5e-6 / size, 0.0)) * moved
     assert np.allclose(force, wall, atol=1e-4)
 
 

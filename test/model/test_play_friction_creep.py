@@ -10,7 +10,7 @@ from wrist_stiffness.mechanism.components import JOINTS, PASSIVE_JOINTS
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.evaluation import evaluate
 from wrist_stiffness.model.memory import lag, play
-from wrist_stiffness.model.pin_play import SMALL_FORCE, WALLS, Play
+from wrist_stiffness.model.pin_play import SMALL_FORCE, WALL, Play
 from wrist_stiffness.model.places import cross_axes, end_screws
 from wrist_stiffness.model.rubbing import Bristles, pressing, slip
 
@@ -76,7 +76,7 @@ def test_flanges_push_the_pin_back_within_its_play(model, make, joint):
     size = np.linalg.norm(moved, axis=-1, keepdims=True)
     assert size.max() < 1.05 * RADIAL
     centring = SMALL_FORCE / RADIAL
-    wall = (centring + WALLS[-1] * np.maximum(1.0 - RADIAL / size, 0.0)) * moved
+    wall = (centring + WALL * np.maximum(1.0 - RADIAL / size, 0.0)) * moved
     assert np.allclose(force, wall, atol=1e-5)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.mechanism.components import ELASTIC, PASSIVE_JOINTS, Array
 from wrist_stiffness.model.contribution import NOTHING, Contribution
-from wrist_stiffness.model.pin_play import WALLS, Play
+from wrist_stiffness.model.pin_play import Play
 from wrist_stiffness.model.places import end_screws
 from wrist_stiffness.model.rubbing import Rubbing, dragged, slip
 from wrist_stiffness.model.situation import Situation
@@ -60,20 +60,20 @@ class HeldPlay(Play):
         return dragged(self.bent + _dragged_by(self.drag, x), self.compliance, self.budget)
 
     def _resting(self, near: Array | None) -> Array:
-        x = self._hindered(self._unhindered(), near)
+        x = self._hindered(self._unhindered() if near is None else near)
         # Bristles that slip are less straight than flanges: a step more leaves no trace of the way.
-        return x + self._step(x, WALLS[-1], *self._state(x, WALLS[-1], None)[1:])
+        return x + self._step(x, *self._state(x, None)[1:])
 
     def _state(
-        self, x: Array, stiffness: float, guess: NDArray[np.bool_] | None
+        self, x: Array, guess: NDArray[np.bool_] | None
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        energy, gradient, active = super()._state(x, stiffness, guess)
+        energy, gradient, active = super()._state(x, guess)
         own, force, _ = self.held(x)
         return energy + own.sum(axis=1), gradient + _on_ends(self.drag, force), active
 
-    def _hessian(self, x: Array, stiffness: float, active: NDArray[np.bool_]) -> Array:
+    def _hessian(self, x: Array, active: NDArray[np.bool_]) -> Array:
         bristles = np.swapaxes(self.drag, -1, -2) @ self.held(x)[2] @ self.drag
-        whole: Array = super()._hessian(x, stiffness, active) + bristles.sum(axis=1)
+        whole: Array = super()._hessian(x, active) + bristles.sum(axis=1)
         return whole
 
 
