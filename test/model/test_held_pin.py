@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from wrist_stiffness.model import batch, pin_rest
+from wrist_stiffness.model import batch, pin_rest, rubbing
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.evaluation import evaluate
@@ -33,6 +33,18 @@ def test_a_bristle_that_is_dragged_lies_in_the_direction_of_its_slip(bent, budge
     if slipped.any():
         assert np.linalg.norm(force[0]) == pytest.approx(budget, rel=1e-9)
         assert force[0] @ slipped == pytest.approx(budget * np.linalg.norm(slipped), rel=1e-9)
+
+
+@given(arrays(float, (6, 2), elements=st.floats(-3.0, 3.0)), st.floats(0.1, 2.0), st.booleans())
+def test_bristles_slip_compiled_as_in_python(moved, budget, yields):
+    bristles = Bristles(moved, np.tile([0.3, 1.7], (6, 1)), np.full(6, budget))
+    give = np.tile([[0.4, 0.3], [0.3, 0.9]], (6, 1, 1)) if yields else None
+    with pytest.MonkeyPatch.context() as plain:
+        assert rubbing.native is not None
+        compiled = slip(bristles, moved[0], give)
+        plain.setattr(rubbing, "native", None)
+        for one, other in zip(compiled, slip(bristles, moved[0], give), strict=True):
+            assert one == pytest.approx(other, abs=1e-12)
 
 
 @given(bends, st.floats(0.1, 2.0))

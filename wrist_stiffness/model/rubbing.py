@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 
+from wrist_stiffness.mechanism.compiled import native
 from wrist_stiffness.mechanism.components import PASSIVE_JOINTS, Array
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.contribution import Contribution
@@ -96,17 +95,19 @@ def slip(bristles: Bristles, foot: Array, give: Array | None = None) -> tuple[Ar
     force, feet = np.empty((n, 2)), np.empty((n + 1, 2))
     x, y = float(foot[0]), float(foot[1])
     feet[0] = x, y
-    compliance = bristles.compliance
-    axes: Iterable[Any] = repeat(((1.0, 0.0), (0.0, 1.0)), n)
+    compliance, axes = bristles.compliance, None
     if give is not None:
         # Along the principal axes a slip adds the same to both compliances.
-        compliance, turned = np.linalg.eigh(compliance[:, :, None] * np.eye(2) + give)
-        axes = turned.tolist()
+        compliance, axes = np.linalg.eigh(compliance[:, :, None] * np.eye(2) + give)
+    if native is not None:
+        given = (bristles.moved, compliance, axes, bristles.budget)
+        native.slip(*(e if e is None else np.ascontiguousarray(e) for e in given), force, feet)
+        return force, feet
     # Plain numbers: the history goes sample by sample, and arrays of two are slow.
     rows = zip(
         bristles.moved.tolist(),
         compliance.tolist(),
-        axes,
+        repeat(((1.0, 0.0), (0.0, 1.0)), n) if axes is None else axes.tolist(),
         bristles.budget.tolist(),
         strict=True,
     )

@@ -187,6 +187,24 @@ static PyObject *hold_of(PyObject *self, PyObject *const *args, Py_ssize_t count
     return PyLong_FromSsize_t(i);
 }
 
+/* Surfaces (n, 2), compliances (n, 2), axes (n, 2, 2) or None, budgets (n); forces (n, 2), feet
+ * (n + 1, 2), of which the first is where they stand. */
+static PyObject *slip_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
+    if (counted(count, 6)) return 0;
+    const Py_ssize_t n = PyObject_Length(args[3]), real = sizeof(double);
+    if (n < 0) return 0;
+    const Py_ssize_t sizes[] = {2 * n * real, 2 * n * real, 4 * n * real, n * real, 2 * n * real,
+                                2 * (n + 1) * real};
+    Buffers b;
+    if (take(&b, args, sizes, "dddddd", 3u << 4)) return 0;
+    Py_BEGIN_ALLOW_THREADS
+    slip((long)n, b.view[0].buf, b.view[1].buf, b.view[2].buf, b.view[3].buf, b.view[4].buf,
+         b.view[5].buf);
+    Py_END_ALLOW_THREADS
+    release(&b);
+    Py_RETURN_NONE;
+}
+
 /* Mechanism, parts, angles (n, 2), loads (n, 6), which of them are in U (n), contact state (m),
  * which are wanted (n); twists (n, 6), configurations (n, 66), contact states (n, m), statuses (n);
  * m.  The contact state goes from sample to sample. */
@@ -404,6 +422,7 @@ static PyMethodDef METHODS[] = {
     FAST("respond", respond_of, "Fill twists, forces and contact states at n configurations."),
     FAST("settle", settle_of, "Fill contact states and forces of n times t problems."),
     FAST("hold", hold_of, "Fill the forces that hold the sectors of n samples closed."),
+    FAST("slip", slip_of, "Fill forces and feet of bristles at n samples."),
     FAST("predict", predict_of, "Fill twists and configurations of n samples in their order."),
     FAST("correct", correct_of, "Fill the corrections of n commands in their order."),
     FAST("read_load", read_of, "Fill what n loads say of a payload."),

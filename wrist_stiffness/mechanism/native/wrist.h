@@ -140,6 +140,10 @@ int settle_matrix(const double *a, int m, const double *gap, unsigned char *clos
 int hold_matrix(const double *a, int m, int columns, const double *gap,
                 const unsigned char *closed, double *force);
 
+/* `axes` (n, 2, 2): principal ones by columns, or null; `feet` (n + 1, 2): the first one is given. */
+void slip(long n, const double *moved, const double *compliance, const double *axes,
+          const double *budget, double *force, double *feet);
+
 static inline double dot3(const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
