@@ -16,7 +16,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
 from wrist_stiffness.sessions.gauges import Gauges
-from wrist_stiffness.sessions.reading.signals import Signal, Stamps, last_of_equal
+from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_any, last_of_equal, set_back
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
@@ -54,6 +54,16 @@ class MeasuredTrack:
     def __len__(self) -> int:
         """Return the number of stamps."""
         return len(self.time_ns)
+
+    def take(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> MeasuredTrack:
+        """Return some of the measurements, in their order."""
+        return replace(
+            self,
+            time_ns=self.time_ns[rows],
+            shift=self.shift[rows],
+            rotation=self.rotation[rows],
+            readings=None if self.readings is None else self.readings[rows],
+        )
 
     def with_remark(self, remark: str) -> MeasuredTrack:
         """Return the track with one more remark."""
@@ -228,15 +238,20 @@ def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tup
 
 def _in_time_order(track: MeasuredTrack, what: str, lost: int) -> MeasuredTrack:
     """Return a track of samples as they came, of which so many were lost, in order of time."""
-    count, rows = len(track), last_of_equal(track.time_ns)
+    count, start_ns = len(track), int(track.time_ns[0])
+    twice = set_back(track.time_ns)
+    for each in twice:
+        track = track.with_remark(f"{what}: {each.told(start_ns)}")
+    if twice:
+        track = track.take(~in_any(twice, track.time_ns))
+    left, rows = len(track), last_of_equal(track.time_ns)
     if lost:
         track = track.with_remark(f"{what}: {lost} of {count} lost by the instrument")
-    time_ns, shift, rotation = track.time_ns[rows], track.shift[rows], track.rotation[rows]
-    track = replace(track, time_ns=time_ns, shift=shift, rotation=rotation)
-    if len(track) == count:
+    track = track.take(rows)
+    if len(track) == left:
         return track
     return track.with_remark(
-        f"{what}: {count - len(track)} of {count} have the stamp of another one: of each only the "
+        f"{what}: {left - len(track)} of {count} have the stamp of another one: of each only the "
         "last is used"
     )
 
