@@ -44,6 +44,7 @@ from wrist_stiffness.sessions.reading.refusals import (
 from wrist_stiffness.sessions.reading.registration import registered
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_any, last_of_equal
 from wrist_stiffness.sessions.reading.static_frames import KnownFrames, frames_of
+from wrist_stiffness.sessions.reading.stood_still import stood_still
 from wrist_stiffness.topics import MOTOR_COMMANDS
 
 GEOMETRY = "geometry_sha256"
@@ -148,7 +149,7 @@ def session_of(
     require_overlap(machine.angles.time_ns, track.time_ns)
     recorded = len(track)
     track = track.take(~in_any(machine.twice, track.time_ns))
-    track, offset = _by_one_clock(machine, track, table)
+    track, offset = _by_one_clock(machine, _without_still(machine, track, table), table)
     remarks, late = [*machine.remarks, *track.remarks], offset
     if offset is not None and _another_clock(offset, machine, track):
         remarks.append(
@@ -210,6 +211,46 @@ def session_of(
     )
     require_enough(session, recorded)
     return session
+
+
+def _without_still(machine: MachineSignals, track: MeasuredTrack, table: Table) -> MeasuredTrack:
+    """Return the track without poses that its instrument only sent again."""
+    if track.repeats is None or not track.repeats.any():
+        return track
+    # What repeats tells nothing of the clocks: it may be a pose of long ago.
+    late = _offset(machine, track.take(~track.repeats), table)
+    if late is not None and not late.fits and abs(late.seconds) > OWN_CLOCK_S:
+        return track
+    moments = _moments(track.time_ns, late)
+    theta = _angles(machine, moments)
+    rows = np.flatnonzero(machine.usable(moments)[0] & table.mechanism.reachable(theta))
+    if track.repeats[rows].all():
+        return track
+    known, rigid = track.take(rows), rigid_rotation(table, theta[rows])
+    time = (known.time_ns - known.time_ns[0]) / NANOSECONDS
+    still = np.zeros(len(track), dtype=bool)
+    still[rows] = stood_still(
+        time,
+        known.shift,
+        known.rotation,
+        rigid,
+        track.repeats[rows],
+        table.geometry.limits.encoder_step,
+    )
+    if not still.any():
+        return track
+    run = np.cumsum(~track.repeats)
+    still = track.repeats & np.isin(run, run[still])
+    began = min(machine.angles.time_ns[0], track.time_ns[0])
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], still, [0]]))).reshape(-1, 2) - [0, 1]
+    spans = (track.time_ns[ends] - began) / NANOSECONDS
+    longest = spans[np.argmax(np.ptp(spans, axis=1))]
+    times = f"{len(spans)} times, the longest " if len(spans) > 1 else ""
+    return track.take(~still).with_remark(
+        f"the measured pose stood still {times}from {longest[0]:.2f} s to {longest[1]:.2f} s, to "
+        "the last digit, while the motors moved or its noise should show: "
+        f"{still.sum()} poses are not used; did the instrument lose its target?"
+    )
 
 
 def path_stamps(machine: MachineSignals, time_ns: Stamps, table: Table) -> Stamps:
@@ -308,6 +349,11 @@ def _seen(
         return None
     rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_quat()
     return track.time_ns[known], track.rotation[known], Signal(time_ns[reachable], rigid)
+
+
+def _offset(machine: MachineSignals, track: MeasuredTrack, table: Table) -> ClockOffset | None:
+    seen = _seen(machine, track, table)
+    return None if seen is None else clock_offset(*seen)
 
 
 def _another_clock(offset: ClockOffset, machine: MachineSignals, track: MeasuredTrack) -> bool:
