@@ -11,6 +11,7 @@ from wrist_stiffness.atomic_file import require_room
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
 from wrist_stiffness.comparing.compare import doubts_load, suspicion_in, wrong_load
+from wrist_stiffness.comparing.too_large import load_too_large
 from wrist_stiffness.comparing.wiring import told_mistake
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate
@@ -65,10 +66,10 @@ def calibrate_model(
     found = calibrate(parent, measured, progress, again)
     child = replace(found.model, lineage=(*parent.lineage, step))
     start = unfitted(parent) if again else parent
-    mistake, much = "", found.fit.rough
+    mistake, much = load_too_large(start, measured), found.fit.rough
     # What is wrong with positions or angles shows in the model as it was; what is wrong with the
     # load hides there behind axes that are a little off their drawing.
-    if much:
+    if not mistake and much:
         mistake = told_mistake(suspicion_in(start, measured))
     if not mistake and (much or doubts_load(found)):
         mistake = wrong_load(start, child, measured, found, asking)

@@ -19,6 +19,7 @@ from wrist_stiffness.commands.read_sessions import (
 )
 from wrist_stiffness.comparing.compare import suspicion_in, wrong_load
 from wrist_stiffness.comparing.explained import Explained, explain
+from wrist_stiffness.comparing.too_large import load_too_large
 from wrist_stiffness.comparing.wiring import WORTH_ASKING, told_mistake
 from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.likelihood import likelihood_of
@@ -135,8 +136,10 @@ def mistake_beside(
     tell: Callable[[str], None] = lambda text: None,
 ) -> str:
     """Return the mistake of signs, units or names that an answer makes likely; empty for none."""
-    mistake, noise = "", answer.diagnosis.noise_of_judge
-    if any(size > WORTH_ASKING * noise[key] for key, size in answer.diagnosis.after.items()):
+    mistake, noise = load_too_large(known, sessions), answer.diagnosis.noise_of_judge
+    if not mistake and any(
+        size > WORTH_ASKING * noise[key] for key, size in answer.diagnosis.after.items()
+    ):
         tell("asking for wrong signs, units and names")
         mistake = told_mistake(suspicion_in(known, sessions))
     if not mistake and _doubts_load(answer):

@@ -11,6 +11,7 @@ import numpy as np
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
 from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.set_up import without_set_up
+from wrist_stiffness.comparing.too_large import load_too_large
 from wrist_stiffness.comparing.wiring import (
     LOAD_MISTAKES,
     MISTAKES,
@@ -72,7 +73,7 @@ def compare_models(
         tuple(compared),
         repeatability(table),
         repeatability(by_side(table)),
-        told_mistake(suspicion),
+        load_too_large(model, sessions) or told_mistake(suspicion),
     )
 
 

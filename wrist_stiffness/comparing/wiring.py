@@ -88,7 +88,9 @@ class Mistake:
         return same_angles or not np.isfinite(session.values[:, 3:]).any()
 
 
-def _load(factor: float) -> Callable[[Block], Block]:
+def _load(force: float, moment: float | None = None) -> Callable[[Block], Block]:
+    """Return the load so many times as large, its moment as the force where it is not told."""
+    factor = np.repeat([force, force if moment is None else moment], 3)
     return lambda block: replace(block, load=factor * block.load)
 
 
@@ -107,6 +109,39 @@ LOAD_MISTAKES = (
         lambda block: replace(block, load_on_platform=not block.load_on_platform),
     ),
 )
+
+GRAMS = 1e3 / 9.80665
+"""Grams-force in a newton."""
+
+LARGE_LOADS = {
+    (True, True): (
+        Mistake(
+            "the load divided by 1000",
+            "is it in mN and N mm where N and N m belong?",
+            _load(1e-3),
+        ),
+        Mistake("the load divided by 102", "is it in grams where N belong?", _load(1.0 / GRAMS)),
+    ),
+    (True, False): (
+        Mistake("the forces divided by 1000", "are they in mN where N belong?", _load(1e-3, 1.0)),
+        Mistake(
+            "the forces divided by 102",
+            "are they in grams where N belong?",
+            _load(1.0 / GRAMS, 1.0),
+        ),
+    ),
+    (False, True): (
+        Mistake(
+            "the moments divided by 1000", "are they in N mm where N m belong?", _load(1.0, 1e-3)
+        ),
+    ),
+}
+"""Units that make loads too large, by whether forces and moments are beyond what a table takes."""
+
+NO_LOAD = Mistake(
+    "the load left out", "does the sensor measure what acts on the platform?", _load(0.0)
+)
+"""What a load is held against that may be none at all."""
 
 MISTAKES = (
     *LOAD_MISTAKES,
@@ -179,7 +214,7 @@ def suspected(
     `calibrated`: effects of the set-up that are not refitted; `left`: what the units leave after
     the refit; `mistakes`: those that are tried.
     """
-    before, count = left.error, _independent(left.observations)
+    before, count = left.error, independent(left.observations)
     gauges = observed.sessions[0].gauges
     mistakes = (*mistakes, *(map(_turned, gauges.members) if gauges is not None else ()))
 
@@ -224,7 +259,7 @@ def told_mistake(suspicion: Suspicion | None) -> str:
     return suspicion.told(suspicion.fall) if suspicion and suspicion.clear else ""
 
 
-def _independent(left: Observations) -> dict[str, float]:
+def independent(left: Observations) -> dict[str, float]:
     """Return how many numbers of each quantity count for themselves."""
     units = np.minimum(np.bincount(left.sessions), INDEPENDENT) / np.bincount(left.sessions)
     known = np.isfinite(left.values) * units[left.sessions, None]

@@ -81,19 +81,35 @@ class MeasuredSession:
         )
 
 
+MOST_BEYOND = 0.5
+"""Share of the samples beyond the load range from which the load is doubted, not the samples."""
+
+
+def overloaded(table: Table, block: Block) -> NDArray[np.bool_]:
+    """Tell which samples of a block have a larger force or moment than a table takes, (n, 2)."""
+    size = np.linalg.norm(block.load.reshape(-1, 2, 3), axis=2)
+    return np.asarray(size > table.geometry.limits.most_load)
+
+
 def beyond_range(table: Table, block: Block) -> list[str]:
     """Say which limits of a table samples exceed: how many, how far, and the limit."""
-    limits, of = table.geometry.limits, len(block)
-    out = []
-    for name, columns, limit, unit in (
-        ("force", slice(0, 3), limits.most_load[0], "N"),
-        ("moment", slice(3, 6), limits.most_load[1], "N m"),
+    of, out = len(block), []
+    largest = np.linalg.norm(block.load.reshape(-1, 2, 3), axis=2).max(axis=0, initial=0.0)
+    for name, beyond, size, limit, unit, others in zip(
+        ("force", "moment"),
+        overloaded(table, block).sum(axis=0).tolist(),
+        largest,
+        table.geometry.limits.most_load,
+        ("N", "N m"),
+        ("mN or grams", "N mm"),
+        strict=True,
     ):
-        size = np.linalg.norm(block.load[:, columns], axis=1)
-        if beyond := int(np.sum(size > limit)):
+        if beyond:
+            doubt = f" (is it in {others}? a recording has {unit})"
             out.append(
                 f"{beyond} of {of} measured poses are not used: the {name} at O goes up to "
-                f"{size.max():.3g} {unit}, the table's limit is {limit:.3g} {unit}"
+                f"{size:.3g} {unit}, the table's limit is {limit:.3g} {unit}"
+                + (doubt if beyond > MOST_BEYOND * of else "")
             )
     outside = ~in_pieces(table.workspace.domain, block.theta)
     if outside.any():

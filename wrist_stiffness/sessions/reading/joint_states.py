@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.mechanism.components import MOTORS, Array
-from wrist_stiffness.sessions.reading.signals import Signal
+from wrist_stiffness.sessions.reading.signals import Signal, Twice
 
 LEAST_CHANGE_RAD = float(np.radians(0.05))
 """Held for a while, a smaller change does little harm [rad]."""
@@ -32,6 +32,12 @@ LEAST_WILD_RAD = float(np.radians(0.2))
 
 ALONE = 4.0
 """Times what its neighbours are off the line without it that a wild one is off the line."""
+
+LEAST_MIXED = 10
+"""Readings one after the other that are out and back: single wild ones are rarer."""
+
+ONE_MOTION = 1.5
+"""Of one motion every second reading is two periods from the last but one, of two it is one."""
 
 WINDOW_S = 0.1
 """Over which speeds are summed up and compared with the way [s]."""
@@ -86,6 +92,37 @@ def _steps(values: Array) -> Array:
     """
     apart = (np.diff(np.unique(column)) for column in values.T)
     return np.array([np.min(each[each > SAME_RAD], initial=np.inf) for each in apart])
+
+
+def mixed(angles: Signal) -> tuple[Twice, ...]:
+    """Find where the angles of two motions alternate: a clock was set back, and all were sorted.
+
+    `angles`: motor angles (m, 2) in the order of their stamps [rad].
+    """
+    time, step = angles.time_ns, np.diff(angles.values, axis=0)
+    # Out by much, back by as much, and that again and again: no motor does so between two readings.
+    there, back = np.abs(step[:-1]), np.abs(step[1:])
+    off = np.abs(angles.values[2:] - angles.values[:-2])
+    out = np.any(np.minimum(there, back) > np.maximum(LEAST_WILD_RAD, ALONE * off), axis=1)
+    if len(out) < LEAST_MIXED or not (often := _in_a_row(out, LEAST_MIXED)).any():
+        return ()
+    rows = 1 + np.flatnonzero(often)
+    # There each motion has its own readings, so that they are twice as dense as elsewhere.
+    apart = time[2:] - time[:-2]
+    period = float(np.median(apart[rows - 1]))
+    if period > 2.0 * DENSE_S * NANOSECONDS:
+        return ()
+    single = np.append(0, 1 + np.flatnonzero(apart > ONE_MOTION * period))
+    edges = np.append(single, len(time) - 1)
+    parts = np.unique(np.searchsorted(single, rows))
+    spans = [(int(time[edges[part - 1]]), int(time[edges[part]])) for part in parts]
+    return tuple(Twice(begin, end, end - begin) for begin, end in spans)
+
+
+def _in_a_row(found: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """Tell which of these belong to so many in a row."""
+    run = np.cumsum(~found)
+    return np.asarray(found & (np.bincount(run, found) >= least)[run])
 
 
 def without_wild(angles: Signal) -> tuple[Signal, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,10 +19,18 @@ from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSampl
 from wrist_stiffness.sessions.reading.joint_states import (
     DENSE_S,
     fault_of,
+    mixed,
     without_held,
     without_wild,
 )
-from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_order
+from wrist_stiffness.sessions.reading.signals import (
+    Signal,
+    Stamps,
+    Twice,
+    in_any,
+    in_order,
+    set_back,
+)
 
 JOINT_GAP_S = 0.5
 """Farthest joint state from a measured pose that still tells its angles [s]."""
@@ -60,6 +68,7 @@ class MachineSignals:
     covariates: Mapping[str, Signal]
     remarks: tuple[str, ...] = ()  # what could not be used
     load_age_limit_s: float = StreamSettings.load_age_limit_s  # oldest load that still counts [s]
+    twice: tuple[Twice, ...] = ()  # times of which angles and loads are left out
 
     def usable(self, time_ns: Stamps) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Tell at which stamps (n,) [ns] angles and load are known, and why not at the others."""
@@ -142,13 +151,17 @@ def machine_signals(
     """
     loads, on_platform = _loads(samples.loads, frames)
     recorded = in_order(samples.joints.time_ns, samples.joints.position)
+    twice = set_back(samples.joints.time_ns) or mixed(recorded)
+    twice = (*twice, *set_back(samples.loads.time_ns))
+    recorded, loads = (each.take(~in_any(twice, each.time_ns)) for each in (recorded, loads))
     read, held_s = without_held(recorded)
     angles, wild = without_wild(read)
     if len(angles) == 0:
         raise InputError("no joint state has finite angles")
     if len(loads) == 0:
         raise InputError("no load estimate is finite")
-    remarks = []
+    start_ns = int(samples.joints.time_ns[0])
+    remarks = list(dict.fromkeys(each.told(start_ns) for each in twice))
     if held_s:
         remarks.append(
             f"the motor angles are read every {held_s:.3g} s and sent more often: they are taken "
@@ -156,7 +169,7 @@ def machine_signals(
         )
     if wild:
         remarks.append(f"{wild} of {len(read)} joint states are wild: left out")
-    speeds = _told_speeds(samples.joints, recorded, read)
+    speeds = _told_speeds(samples.joints, recorded, read, twice)
     fault = "" if speeds is None else fault_of(speeds, angles)
     if fault:
         remarks.append(fault)
@@ -184,6 +197,7 @@ def machine_signals(
         covariates,
         tuple(remarks),
         load_age_limit_s,
+        twice,
     )
 
 
@@ -204,9 +218,12 @@ def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
     return in_order(loads.time_ns, wrench), any(on_platform.values())
 
 
-def _told_speeds(joints: JointSamples, recorded: Signal, read: Signal) -> Signal | None:
+def _told_speeds(
+    joints: JointSamples, recorded: Signal, read: Signal, twice: Sequence[Twice]
+) -> Signal | None:
     """Return the speeds where angles were read, None where drivers leave them out or at zero."""
     speeds = in_order(joints.time_ns, joints.velocity)
+    speeds = speeds.take(~in_any(twice, speeds.time_ns))
     if len(speeds) != len(recorded) or not np.any(speeds.values != 0.0):
         return None
     rows = np.searchsorted(speeds.time_ns, read.time_ns)

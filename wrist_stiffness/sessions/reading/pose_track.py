@@ -16,7 +16,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.recording.samples import MarkerSamples, PoseSamples, Samples
 from wrist_stiffness.sessions.gauges import Gauges
-from wrist_stiffness.sessions.reading.signals import Signal, Stamps, last_of_equal
+from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_any, last_of_equal, set_back
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
@@ -50,10 +50,23 @@ class MeasuredTrack:
     unplaced: bool = False
     gauges: Gauges | None = None
     readings: Array | None = None  # (n, K), of the gauges [m] or [rad]; NaN = not read
+    # (n,), poses that came as the one before to the bit; None where that is not known
+    repeats: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         """Return the number of stamps."""
         return len(self.time_ns)
+
+    def take(self, rows: slice | NDArray[np.bool_] | NDArray[np.intp]) -> MeasuredTrack:
+        """Return some of the measurements, in their order."""
+        return replace(
+            self,
+            time_ns=self.time_ns[rows],
+            shift=self.shift[rows],
+            rotation=self.rotation[rows],
+            readings=None if self.readings is None else self.readings[rows],
+            repeats=None if self.repeats is None else self.repeats[rows],
+        )
 
     def with_remark(self, remark: str) -> MeasuredTrack:
         """Return the track with one more remark."""
@@ -167,7 +180,7 @@ def _track_of_poses(poses: PoseSamples, what: str, frames: Frames) -> MeasuredTr
         )
     lost = int((~turned & np.isnan(shift).all(axis=1) & ~huge.all(axis=1)).sum())
     track = MeasuredTrack(poses.time_ns, shift + origin, rotation, covariance, tuple(remarks))
-    return _in_time_order(track, what, lost)
+    return _in_time_order(track, np.hstack([poses.position, poses.quaternion]), what, lost)
 
 
 def _stated(covariance: Array, measured: NDArray[np.bool_]) -> Array | None:
@@ -210,7 +223,8 @@ def _track_of_markers(samples: MarkerSamples, nominal: Array, frames: Frames) ->
             f"{what}: at most {seen.max()} of {count} were seen at once; at least {LEAST_MARKERS} "
             "that are not on a line are needed for a pose"
         )
-    return _in_time_order(MeasuredTrack(samples.time_ns, shift, rotation), what, unseen)
+    came = samples.position.reshape(len(shift), -1)
+    return _in_time_order(MeasuredTrack(samples.time_ns, shift, rotation), came, what, unseen)
 
 
 def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tuple[Array, Array]:
@@ -226,17 +240,29 @@ def base_transform(frame_id: NDArray[np.str_], what: str, frames: Frames) -> tup
     return found[0]
 
 
-def _in_time_order(track: MeasuredTrack, what: str, lost: int) -> MeasuredTrack:
-    """Return a track of samples as they came, of which so many were lost, in order of time."""
-    count, rows = len(track), last_of_equal(track.time_ns)
+def _in_time_order(track: MeasuredTrack, came: Array, what: str, lost: int) -> MeasuredTrack:
+    """Return a track of samples, of which so many were lost, in order of time.
+
+    `came` (n, k): the numbers of each sample as they came; NaN = not measured.
+    """
+    count, start_ns = len(track), int(track.time_ns[0])
+    twice = set_back(track.time_ns)
+    for each in twice:
+        track = track.with_remark(f"{what}: {each.told(start_ns)}")
+    if twice:
+        once = ~in_any(twice, track.time_ns)
+        track, came = track.take(once), came[once]
+    left, rows = len(track), last_of_equal(track.time_ns)
     if lost:
         track = track.with_remark(f"{what}: {lost} of {count} lost by the instrument")
-    time_ns, shift, rotation = track.time_ns[rows], track.shift[rows], track.rotation[rows]
-    track = replace(track, time_ns=time_ns, shift=shift, rotation=rotation)
-    if len(track) == count:
+    track, came = track.take(rows), came[rows]
+    same = (came[1:] == came[:-1]) | np.isnan(came[1:]) & np.isnan(came[:-1])
+    seen = np.isfinite(track.shift).any(axis=1) | np.isfinite(track.rotation).any(axis=(1, 2))
+    track = replace(track, repeats=seen & np.append(False, same.all(axis=1)))
+    if len(track) == left:
         return track
     return track.with_remark(
-        f"{what}: {count - len(track)} of {count} have the stamp of another one: of each only the "
+        f"{what}: {left - len(track)} of {count} have the stamp of another one: of each only the "
         "last is used"
     )
 

@@ -29,7 +29,7 @@ from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
-from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset
+from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset, clock_step
 from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings, held_to
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
@@ -42,8 +42,9 @@ from wrist_stiffness.sessions.reading.refusals import (
     require_topics,
 )
 from wrist_stiffness.sessions.reading.registration import registered
-from wrist_stiffness.sessions.reading.signals import Signal, Stamps
+from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_any, last_of_equal
 from wrist_stiffness.sessions.reading.static_frames import KnownFrames, frames_of
+from wrist_stiffness.sessions.reading.stood_still import stood_still
 from wrist_stiffness.topics import MOTOR_COMMANDS
 
 GEOMETRY = "geometry_sha256"
@@ -145,9 +146,11 @@ def session_of(
     `InputError` if too few poses are left, or they are those of another wrist, or gauges do not
     stand where they are said to.
     """
-    remarks = [*machine.remarks, *track.remarks]
     require_overlap(machine.angles.time_ns, track.time_ns)
-    offset = late = _offset(machine, track, table)
+    recorded = len(track)
+    track = track.take(~in_any(machine.twice, track.time_ns))
+    track, offset = _by_one_clock(machine, _without_still(machine, track, table), table)
+    remarks, late = [*machine.remarks, *track.remarks], offset
     if offset is not None and _another_clock(offset, machine, track):
         remarks.append(
             f"the clock of the pose sensor is {offset.seconds:+.3f} s (uncertain by "
@@ -206,8 +209,48 @@ def session_of(
         gauges=gauges,
         readings=readings,
     )
-    require_enough(session, len(track))
+    require_enough(session, recorded)
     return session
+
+
+def _without_still(machine: MachineSignals, track: MeasuredTrack, table: Table) -> MeasuredTrack:
+    """Return the track without poses that its instrument only sent again."""
+    if track.repeats is None or not track.repeats.any():
+        return track
+    # What repeats tells nothing of the clocks: it may be a pose of long ago.
+    late = _offset(machine, track.take(~track.repeats), table)
+    if late is not None and not late.fits and abs(late.seconds) > OWN_CLOCK_S:
+        return track
+    moments = _moments(track.time_ns, late)
+    theta = _angles(machine, moments)
+    rows = np.flatnonzero(machine.usable(moments)[0] & table.mechanism.reachable(theta))
+    if track.repeats[rows].all():
+        return track
+    known, rigid = track.take(rows), rigid_rotation(table, theta[rows])
+    time = (known.time_ns - known.time_ns[0]) / NANOSECONDS
+    still = np.zeros(len(track), dtype=bool)
+    still[rows] = stood_still(
+        time,
+        known.shift,
+        known.rotation,
+        rigid,
+        track.repeats[rows],
+        table.geometry.limits.encoder_step,
+    )
+    if not still.any():
+        return track
+    run = np.cumsum(~track.repeats)
+    still = track.repeats & np.isin(run, run[still])
+    began = min(machine.angles.time_ns[0], track.time_ns[0])
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], still, [0]]))).reshape(-1, 2) - [0, 1]
+    spans = (track.time_ns[ends] - began) / NANOSECONDS
+    longest = spans[np.argmax(np.ptp(spans, axis=1))]
+    times = f"{len(spans)} times, the longest " if len(spans) > 1 else ""
+    return track.take(~still).with_remark(
+        f"the measured pose stood still {times}from {longest[0]:.2f} s to {longest[1]:.2f} s, to "
+        "the last digit, while the motors moved or its noise should show: "
+        f"{still.sum()} poses are not used; did the instrument lose its target?"
+    )
 
 
 def path_stamps(machine: MachineSignals, time_ns: Stamps, table: Table) -> Stamps:
@@ -265,7 +308,39 @@ def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
     return out
 
 
-def _offset(machine: MachineSignals, track: MeasuredTrack, table: Table) -> ClockOffset | None:
+def _by_one_clock(
+    machine: MachineSignals, track: MeasuredTrack, table: Table
+) -> tuple[MeasuredTrack, ClockOffset | None]:
+    """Return the track, its clock followed where it or that of the joint states was set, and that.
+
+    The offset is what is left between the two clocks.
+    """
+    seen = _seen(machine, track, table)
+    offset = None if seen is None else clock_offset(*seen)
+    if seen is None or offset is None or offset.fits:
+        return track, offset
+    step = clock_step(*seen, OWN_CLOCK_GAIN)
+    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * _longest_period_s(machine, track))
+    if step is None or abs(step.seconds) <= max(least, 3.0 * step.sigma):
+        return track, offset
+    later = track.time_ns > step.end_ns
+    shift_ns = np.where(later, round(step.seconds * NANOSECONDS), 0)
+    began = min(machine.angles.time_ns[0], track.time_ns[0])
+    around = ~later & (track.time_ns >= step.begin_ns)
+    mended = replace(track, time_ns=track.time_ns - shift_ns).take(~around)
+    mended = mended.take(last_of_equal(mended.time_ns)).with_remark(
+        f"the clock of the pose sensor steps by {step.seconds:+.3f} s (uncertain by "
+        f"{step.sigma:.3f} s) against that of the joint states, "
+        f"{(step.begin_ns - began) / NANOSECONDS:.1f} s after the start: taken out; {around.sum()} "
+        "poses around it are not used"
+    )
+    return _by_one_clock(machine, mended, table)
+
+
+def _seen(
+    machine: MachineSignals, track: MeasuredTrack, table: Table
+) -> tuple[Stamps, Array, Signal] | None:
+    """Return stamps and rotations that were measured, and the rigid ones; None without any."""
     known = np.isfinite(track.rotation).all(axis=(1, 2))
     every = max(1, len(machine.angles) // ANGLES_USED)
     theta, time_ns = machine.angles.values[::every], machine.angles.time_ns[::every]
@@ -273,14 +348,18 @@ def _offset(machine: MachineSignals, track: MeasuredTrack, table: Table) -> Cloc
     if not known.any() or not reachable.any():
         return None
     rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_quat()
-    turned = Signal(time_ns[reachable], rigid)
-    return clock_offset(track.time_ns[known], track.rotation[known], turned)
+    return track.time_ns[known], track.rotation[known], Signal(time_ns[reachable], rigid)
+
+
+def _offset(machine: MachineSignals, track: MeasuredTrack, table: Table) -> ClockOffset | None:
+    seen = _seen(machine, track, table)
+    return None if seen is None else clock_offset(*seen)
 
 
 def _another_clock(offset: ClockOffset, machine: MachineSignals, track: MeasuredTrack) -> bool:
     """Tell whether an offset is one of clocks, not a delay that the wrist's model can have."""
-    period = max(_period_s(machine.angles.time_ns), _period_s(track.time_ns))
-    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * period, 3.0 * offset.sigma)
+    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * _longest_period_s(machine, track))
+    least = max(least, 3.0 * offset.sigma)
     return abs(offset.seconds) > least and offset.gain > OWN_CLOCK_GAIN
 
 
@@ -290,17 +369,28 @@ def _rigid_when_measured(
     """Return the rigid rotations at the moments of the poses, not at their late stamps."""
     if late is None or abs(late.seconds) <= 3.0 * late.sigma:
         return rigid
-    own = machine.angles.time_ns
-    moments = np.clip(time_ns - round(late.seconds * NANOSECONDS), own[0], own[-1])
-    theta = machine.angles.interpolated(moments)
+    theta = _angles(machine, _moments(time_ns, late))
     reachable = table.mechanism.reachable(theta)
     meant = rigid.copy()
     meant[reachable] = rigid_rotation(table, theta[reachable])
     return meant
 
 
-def _period_s(time_ns: Stamps) -> float:
-    return float(np.median(np.diff(time_ns))) / NANOSECONDS if len(time_ns) > 1 else 0.0
+def _moments(time_ns: Stamps, late: ClockOffset | None) -> Stamps:
+    """Return when poses were measured whose stamps are late, by the joint states' clock [ns]."""
+    return time_ns if late is None else time_ns - round(late.seconds * NANOSECONDS)
+
+
+def _angles(machine: MachineSignals, time_ns: Stamps) -> Array:
+    """Return the motor angles (n, 2) at any stamps [rad]: outside of theirs those at the end."""
+    own = machine.angles.time_ns
+    return machine.angles.interpolated(np.clip(time_ns, own[0], own[-1]))
+
+
+def _longest_period_s(machine: MachineSignals, track: MeasuredTrack) -> float:
+    """Return the longer one of the sample periods of angles and poses [s]."""
+    periods = (np.diff(each) for each in (machine.angles.time_ns, track.time_ns) if len(each) > 1)
+    return max((float(np.median(each)) / NANOSECONDS for each in periods), default=0.0)
 
 
 def _another_geometry(notes: Mapping[str, Any], table: Table) -> list[str]:
