@@ -287,12 +287,13 @@ def _descended(
     there is one, serve until they lead no further; all of them, or the `known` ones (p,).  The end
     is after a step with all columns of the very point where it began that gains next to nothing;
     where these are `kept`, it is where they lead no further.  A fit that begins far off takes
-    differences, which see flanges that touch within a step; near by, slopes are as good.
+    differences, which see flanges that touch within a step, and so does one whose columns are
+    `kept`; near by, slopes are as good.
     """
     lower, upper = problem.bounds
     weights = problem.weights
     residual = problem.residual(z)
-    scale, columns, slopes = 0.0, near, near is not None
+    scale, columns, slopes = 0.0, near, near is not None and not kept
     for _ in range(MOST_STEPS):
         fresh = columns is None
         columns = _columns(problem, firm, z, columns, known, width, slopes)
