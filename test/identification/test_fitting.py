@@ -195,7 +195,8 @@ def test_scatter_beyond_what_the_instrument_states_is_found(model):
     assert by_scatter < known < 2.0 * by_scatter
 
 
-def test_columns_are_the_derivative_of_the_residual(model):
+@pytest.mark.parametrize("slopes", [False, True])
+def test_columns_are_the_derivative_of_the_residual(model, slopes):
     rng = np.random.default_rng(2)
     session = measured(model, poses(rng, 12), rng)
     free = [
@@ -205,7 +206,7 @@ def test_columns_are_the_derivative_of_the_residual(model):
     # A flange that is about to touch has two derivatives: what only flanges feel stays at zero.
     names = [(problem.free[u.free].effect.name, u.key) for u in problem.unknowns]
     z = np.where([n == ("axis_misalignment@joint_3", "shift_v_um") for n in names], 0.0, 0.2)
-    columns = problem.columns(z)
+    columns = problem.columns(z, slopes=slopes)
     for place in range(len(z)):
         step = np.zeros(len(z))
         step[place] = 1e-3
@@ -214,13 +215,14 @@ def test_columns_are_the_derivative_of_the_residual(model):
         assert np.max(np.abs(columns[:, :, place] - central) / scale) < 0.05
 
 
-def test_columns_in_motion_beside_an_effect_with_a_past_are_the_derivative_too(model):
+@pytest.mark.parametrize("slopes", [False, True])
+def test_columns_in_motion_beside_an_effect_with_a_past_are_the_derivative_too(model, slopes):
     pull = effect("cable_wrench@platform", fx_N=8.0, fz_1_N_per_rad=20.0, hysteresis_deg=4.0)
     session = simulated(model, seconds=30.0)
     free = [each for each in commissioning(model)[0] if each.effect.law.id != "flange_contact"]
     problem = problem_of(model.with_effects(pull), [session], free)
     z = np.full(len(problem.unknowns), 0.2)
-    columns = problem.columns(z)
+    columns = problem.columns(z, slopes=slopes)
     off = []
     for place, step in enumerate(1e-3 * np.eye(len(z))):
         central = (problem.residual(z + step) - problem.residual(z - step)) / 2e-3

@@ -245,14 +245,13 @@ class FitProblem:
         """Return the change of the residuals by a step of each unknown, (u, 6, p); NaN as 0.
 
         By one-sided differences, away from the nearer bound, and from where a formula is undefined.
-        Effects with a past do beside another
-        parameter what they do beside this one: so only their own columns follow the path anew.
+        Effects with a past do beside another parameter what they do beside this one: so only their
+        own columns follow the path anew.
 
-        `z` (p,): steps from the prior means; `places`: which unknowns are asked for; all by
-        default; `width`: of the differences, in steps;
-        `slopes`: whether constants are carried to first order, with flanges that touch held closed:
-        that is quicker by a third, and as near but where a flange touches within a step.
-        Those are in the order of `places`.
+        `z` (p,): steps from the prior means; `places`: which unknowns are asked for, in that order;
+        all by default; `width`: of the differences, in steps; `slopes`: whether constants are
+        carried to first order, with flanges that touch held closed: that is quicker by a third, and
+        as near but where a flange touches within a step.
         """
         asked = list(range(len(self.unknowns)) if places is None else places)
         slopes &= width == STEP
