@@ -313,28 +313,36 @@ def _by_one_clock(
 ) -> tuple[MeasuredTrack, ClockOffset | None]:
     """Return the track, its clock followed where it or that of the joint states was set, and that.
 
-    The offset is what is left between the two clocks.
+    The offset is what is left between the two clocks.  What fits no better is not followed.
     """
+    offset = _offset(machine, track, table)
+    while offset is not None and not offset.fits:
+        followed = _one_step(machine, track, table)
+        left = None if followed is None else _offset(machine, followed, table)
+        if followed is None or left is None or left.misfit >= offset.misfit:
+            break
+        track, offset = followed, left
+    return track, offset
+
+
+def _one_step(machine: MachineSignals, track: MeasuredTrack, table: Table) -> MeasuredTrack | None:
+    """Return the track with one step of a clock taken out, None where there is none."""
     seen = _seen(machine, track, table)
-    offset = None if seen is None else clock_offset(*seen)
-    if seen is None or offset is None or offset.fits:
-        return track, offset
-    step = clock_step(*seen, OWN_CLOCK_GAIN)
+    step = None if seen is None else clock_step(*seen, OWN_CLOCK_GAIN)
     least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * _longest_period_s(machine, track))
     if step is None or abs(step.seconds) <= max(least, 3.0 * step.sigma):
-        return track, offset
+        return None
     later = track.time_ns > step.end_ns
     shift_ns = np.where(later, round(step.seconds * NANOSECONDS), 0)
     began = min(machine.angles.time_ns[0], track.time_ns[0])
     around = ~later & (track.time_ns >= step.begin_ns)
     mended = replace(track, time_ns=track.time_ns - shift_ns).take(~around)
-    mended = mended.take(last_of_equal(mended.time_ns)).with_remark(
+    return mended.take(last_of_equal(mended.time_ns)).with_remark(
         f"the clock of the pose sensor steps by {step.seconds:+.3f} s (uncertain by "
         f"{step.sigma:.3f} s) against that of the joint states, "
         f"{(step.begin_ns - began) / NANOSECONDS:.1f} s after the start: taken out; {around.sum()} "
         "poses around it are not used"
     )
-    return _by_one_clock(machine, mended, table)
 
 
 def _seen(
