@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.model.error_model import Prediction
@@ -35,7 +34,7 @@ def residual_of_pose(rotation: Array, position: Array, prediction: Prediction) -
 class MonitorSettings:
     """What counts as a change."""
 
-    noise: Array  # (6,), standard deviation of the measured pose [m, rad]
+    noise: Array  # (6,), standard deviation of the measured pose, positive [m, rad]
     baseline: int = 500  # samples from which the baseline is learned
     slack: float = 0.5  # changes below this are not counted [standard deviations]
     # sum at which there is an alarm [standard deviations]; 15 means one false alarm in about a
@@ -44,11 +43,6 @@ class MonitorSettings:
     # oldest joint state and oldest pose of the frame that are still matched with a pose [s]
     joint_age_limit_s: float = 0.02
     frame_age_limit_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Refuse noise that is not positive."""
-        if not np.all(self.noise > 0.0):
-            raise InputError(f"monitor: noise {self.noise.tolist()} is not positive")
 
 
 class ResidualMonitor:

@@ -8,11 +8,10 @@ from importlib.metadata import version
 
 import numpy as np
 
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.condensed_store import PACKAGES, CondensedSolid, condense_solid
 from wrist_stiffness.fem.parts import RINGS, Part, Solid, wrist_parts
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
-from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement
+from wrist_stiffness.fem.superelement import Interface, Superelement
 from wrist_stiffness.mechanism.components import (
     LINKS,
     PASSIVE_JOINTS,
@@ -58,10 +57,8 @@ def elastic_components(
     `interface`: how walls follow their frames; `progress`: see `PartProgress`; `condenser`:
     `condense_solid`, or a `CondensedStore` that remembers; `rings`: contact modes over the width of
     a flange.  Gives `ElasticComponents`: at O in F with the wrist at home.  Raises `GeometryError`
-    if a part cannot be built; `InputError` if the interface model is unknown.
+    if a part cannot be built.
     """
-    if interface not in INTERFACES:
-        raise InputError(f"interface model '{interface}' is not one of {', '.join(INTERFACES)}")
     parts = wrist_parts(geometry, rings)
     condensed: dict[Solid, CondensedSolid] = {}
     for done, part in enumerate(parts):
