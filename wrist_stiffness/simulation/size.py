@@ -135,12 +135,10 @@ class Scale:
 
     def signature(self, hidden: HiddenEffect) -> Array:
         """Return the change of the residual twist by an effect, (n, 6) [m, rad]."""
-        sample, without = self._run((hidden,)), self._without
-        base = self._base
-        for name in ("encoder", "wrench"):
-            if not np.array_equal(getattr(sample, name), getattr(without, name)):
-                base = base_pose(self._table, sample.encoder, sample.wrench)
-                break
+        sample, without, base = self._run((hidden,)), self._without, self._base
+        said = np.hstack([sample.encoder, sample.wrench])
+        if not np.array_equal(said, np.hstack([without.encoder, without.wrench])):
+            base = base_pose(self._table, sample.encoder, sample.wrench)
         return departure(sample.measured_rotation, sample.measured_shift, base) - self._residual
 
     def size(self, hidden: HiddenEffect) -> float:
