@@ -83,7 +83,7 @@ def build_table(
             geometry,
             sizes,
             settings.interface,
-            lambda done, of, name: progress(done, steps),
+            lambda done, of: progress(done, steps),
             condenser,
             rings,
         )
