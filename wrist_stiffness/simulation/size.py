@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
@@ -118,7 +117,8 @@ class Scale:
         self._residual = departure(without.measured_rotation, without.measured_shift, self._base)
         covariance = sample_covariance(table, without.encoder, settings.instrument)
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-        self.counted = self._loaded_or_moving(without)
+        moves = np.diff(without.encoder, axis=0, prepend=without.encoder[:1]).any(axis=1)
+        self.counted = moves | without.wrench.any(axis=1)
 
     def _run(self, hidden: tuple[HiddenEffect, ...]) -> CellSample:
         settings = replace(self._quiet, hidden=self._settings.hidden + hidden)
@@ -128,10 +128,6 @@ class Scale:
             for time_s in np.split(self.time_s, np.arange(BLOCK, len(self.time_s), BLOCK))
         ]
         return joined(blocks)
-
-    def _loaded_or_moving(self, sample: CellSample) -> NDArray[np.bool_]:
-        moving = np.any(np.diff(sample.encoder, axis=0, prepend=sample.encoder[:1]) != 0.0, axis=1)
-        return moving | np.any(sample.wrench != 0.0, axis=1)
 
     def signature(self, hidden: HiddenEffect) -> Array:
         """Return the change of the residual twist by an effect, (n, 6) [m, rad]."""
