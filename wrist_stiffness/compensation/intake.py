@@ -199,18 +199,6 @@ class Frames:
         return frame
 
 
-def _sensor_frame(
-    parent: str,
-    position: Array | None = None,
-    rpy: Array | None = None,
-    acts_on: Literal["platform", "environment"] = "platform",
-) -> SensorFrame:
-    turned = Rotation.from_euler("xyz", np.zeros(3) if rpy is None else rpy)
-    return SensorFrame(
-        parent, turned.as_matrix(), np.zeros(3) if position is None else position, acts_on
-    )
-
-
 FRAME = record(
     {"parent": text(BASE_FRAME, PLATFORM_FRAME)},
     {
@@ -218,7 +206,9 @@ FRAME = record(
         "rpy_deg": Quantity(vector()),
         "acts_on": text("platform", "environment"),
     },
-    make=_sensor_frame,
+    make=lambda rpy=(0.0, 0.0, 0.0), **others: SensorFrame(
+        rotation=Rotation.from_euler("xyz", rpy).as_matrix(), **others
+    ),
 )
 
 

@@ -67,10 +67,6 @@ class LoadHistory:
     def _age_limit_ns(self) -> int:
         return round(self.age_limit_s * NANOSECONDS)
 
-    def __len__(self) -> int:
-        """Return how many loads are kept."""
-        return len(self._stamps)
-
     @property
     def newest_ns(self) -> int | None:
         """Newest stamp [ns], None where no load has arrived."""

@@ -25,7 +25,6 @@ from wrist_stiffness.fem.parts import ElasticBody
 from wrist_stiffness.mechanism.components import Array
 
 Interface = Literal["rigid", "distributing", "sliding"]
-INTERFACES: tuple[Interface, ...] = ("rigid", "distributing", "sliding")
 
 ALL_WAYS = (0, 1, 2)
 RADIALLY = (0,)
