@@ -123,13 +123,6 @@ class Mechanism:
             )
 
     @cached_property
-    def alphas(self) -> Array:
-        """Link angles alpha_1 ... alpha_5 between (a1,b), (b,c), (c,d), (d,a2), (a1,a2) [rad]."""
-        u = np.array([self.a1, self.b0, self.c0, self.d0, self.a1])
-        v = np.array([self.b0, self.c0, self.d0, self.a2, self.a2])
-        return angle_between(u, v)
-
-    @cached_property
     def assembly_mode(self) -> float:
         """Return sigma = sign(c . (b x d)) at home: the branch of the closure, +1 or -1."""
         return float(np.sign(self.c0 @ np.cross(self.b0, self.d0)))
@@ -244,7 +237,7 @@ class Mechanism:
     def _refuse_open_loop(self, theta: Array, k: Array, gram: Array) -> None:
         wrong = ~(gram > GRAM_ROUNDING)
         angle = np.degrees(np.arccos(np.clip(first_where(k[..., None], wrong)[0], -1.0, 1.0)))
-        alpha_2, alpha_3 = np.degrees(self.alphas[1:3])
+        alpha_2, alpha_3 = np.degrees(np.arccos(self._cosines))
         raise UnreachablePoseError(
             f"motor angles {angles_text(first_where(theta, wrong))}: the loop does not close; the "
             f"angle between joint_2 and joint_4 is {angle:.3f} deg, it must lie between "
