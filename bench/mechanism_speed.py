@@ -21,7 +21,7 @@ from wrist_stiffness.mechanism.components import (
 from wrist_stiffness.mechanism.contact import solve_contact
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
 from wrist_stiffness.mechanism.influence import influence
-from wrist_stiffness.mechanism.statics import compliance, contact_operators, weight_wrench
+from wrist_stiffness.mechanism.statics import component_shares, contact_operators, weight_wrench
 
 SECTORS = 8
 POSES = 1000
@@ -71,10 +71,12 @@ def main() -> None:
         calls: dict[str, Callable[[], object]] = {
             "forward": lambda theta=theta: mechanism.forward(theta),
             "influence": lambda at=at: influence(at),
-            "compliance, influence included": lambda at=at: compliance(at, components),
-            "forward to compliance": lambda theta=theta: compliance(
-                mechanism.forward(theta), components
+            "compliance, influence included": lambda at=at: component_shares(at, components).sum(
+                axis=-3
             ),
+            "forward to compliance": lambda theta=theta: component_shares(
+                mechanism.forward(theta), components
+            ).sum(axis=-3),
             "own weight": lambda at=at: weight_wrench(at, components, gravity, influence(at)),
             "contact operators, 24 sectors": lambda at=at: contact_operators(
                 at, components, gravity

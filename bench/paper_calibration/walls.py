@@ -12,13 +12,14 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from paper_page import insert_blocks
 from scipy.optimize import brentq
 
 from wrist_stiffness.fem.components import SHIPPED_SIZES, elastic_components
-from wrist_stiffness.fem.superelement import INTERFACES
+from wrist_stiffness.fem.superelement import Interface
 from wrist_stiffness.lookup.response import rated_map
 from wrist_stiffness.mechanism.components import ELASTIC, JOINTS, Array, ElasticComponents
 from wrist_stiffness.mechanism.geometry_file import load_geometry, mechanism_of
@@ -59,7 +60,7 @@ def main() -> None:
         )
 
     rows = [row(*PAPER)]
-    for interface in INTERFACES:
+    for interface in get_args(Interface):
         components, _ = elastic_components(geometry, sizes, interface)
         rows.append(row(f"`{interface}`, shipped sizes", *figures(components)))
         times = brentq(

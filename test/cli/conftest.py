@@ -46,6 +46,6 @@ def small_table(tmp_path_factory):
             configuration, contact_operators(configuration, components, np.zeros(3)), geometry
         ),
     )
-    errors = {**table.header.errors, **sweep.interpolation_errors(table)}
+    errors = {**table.header.errors, "predicted": sweep.interpolation_errors(table)}
     path = tmp_path_factory.mktemp("tables") / "small.npz"
     return save_table(replace(table, header=replace(table.header, errors=errors)), path), path

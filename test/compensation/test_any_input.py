@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.intake import static_transform
-from wrist_stiffness.compensation.monitor import MonitorSettings
-from wrist_stiffness.compensation.monitor_stream import MonitorStream
+from wrist_stiffness.compensation.monitor import MonitorSettings, MonitorStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.compensation.trajectory_plan import planned_point

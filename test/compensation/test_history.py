@@ -12,8 +12,7 @@ from wrist_stiffness.compensation.belief import State, SupervisorSettings
 from wrist_stiffness.compensation.correction import residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.held_signals import HeldSignals
-from wrist_stiffness.compensation.monitor import MonitorSettings
-from wrist_stiffness.compensation.monitor_stream import MonitorStream
+from wrist_stiffness.compensation.monitor import MonitorSettings, MonitorStream
 from wrist_stiffness.compensation.safety import SafetySettings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream

@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.intake import Frames, SensorFrame
-from wrist_stiffness.compensation.monitor import MonitorSettings
-from wrist_stiffness.compensation.monitor_stream import MonitorStream
+from wrist_stiffness.compensation.monitor import MonitorSettings, MonitorStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.model.error_model import Load

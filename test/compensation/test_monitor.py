@@ -7,7 +7,6 @@ from wrist_stiffness.compensation.monitor import (
     ResidualMonitor,
     residual_of_pose,
 )
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import Load
 
 NOISE = np.repeat([1e-6, 2e-5], 3)
@@ -94,8 +93,3 @@ def test_what_is_not_measured_is_left_out():
     monitor, alarms = run(samples)
     assert alarms[0] >= 1000
     assert np.all(np.isfinite(monitor.rms))
-
-
-def test_noise_must_be_positive():
-    with pytest.raises(InputError, match="not positive"):
-        MonitorSettings(np.zeros(6))

@@ -13,7 +13,7 @@ from wrist_stiffness.errors import InputError, TableError
 from wrist_stiffness.fem.components import elastic_components
 from wrist_stiffness.mechanism.geometry_file import mechanism_of
 from wrist_stiffness.mechanism.modes import RigidBody, natural_modes, plate
-from wrist_stiffness.mechanism.statics import compliance
+from wrist_stiffness.mechanism.statics import component_shares
 
 CONDENSED = 0.01
 """Of six modes; inertia inside a part follows its frames as in statics."""
@@ -76,7 +76,7 @@ def test_massless_limbs_leave_the_platform_on_its_compliance(skewed_components):
     pose = mechanism_of(geometry).forward(POSE)
     turn = np.kron(np.eye(2), pose.platform)
     mass = turn @ PAYLOAD.at_centre @ turn.T
-    product = compliance(pose, components) @ mass
+    product = component_shares(pose, components).sum(axis=-3) @ mass
     expected = 1.0 / (2.0 * np.pi * np.sqrt(np.sort(np.linalg.eigvals(product).real)[::-1]))
     found = natural_modes(pose, light, (PAYLOAD,), STATES["open"])
     np.testing.assert_allclose(found.frequency, expected, rtol=1e-6)

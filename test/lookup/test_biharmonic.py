@@ -74,36 +74,6 @@ def test_value_agrees_with_the_literal_sum():
         np.testing.assert_allclose(spline(theta), literal_sum(spline, theta), atol=1e-11)
 
 
-def test_leave_one_out_agrees_with_fitting_again_without_the_node():
-    nodes = scattered(inner=16)
-    values = smooth(nodes)
-    shortcut = BiharmonicSpline.fit(nodes, values).leave_one_out()
-    # The corners stay: without one the box of the refit would be another.
-    for left_out in range(4, len(nodes)):
-        others = np.delete(np.arange(len(nodes)), left_out)
-        refit = BiharmonicSpline.fit(nodes[others], values[others])
-        error = refit(nodes[left_out]) - values[left_out]
-        np.testing.assert_allclose(shortcut[left_out], error, atol=1e-9)
-
-
-def test_leave_one_out_at_a_corner_agrees_with_scipy():
-    nodes = square_grid(5)
-    values, box = smooth(nodes), 2.0 * HALF_RANGE
-    refit = RBFInterpolator(nodes[1:] / box, values[1:], kernel="thin_plate_spline", degree=1)
-    expected = refit(nodes[:1] / box)[0] - values[0]
-    shortcut = BiharmonicSpline.fit(nodes, values).leave_one_out()
-    np.testing.assert_allclose(shortcut[0], expected, atol=1e-9)
-
-
-def test_leave_one_out_refuses_a_node_that_cannot_be_spared():
-    # All but the last on an oblique line: no plane without it.
-    along = np.random.default_rng(5).uniform(0.0, 1.0, 30)
-    nodes = np.vstack([along[:, None] * [0.7, -1.9] + [0.11, 0.3], [0.3, 1.0]])
-    spline = BiharmonicSpline.fit(nodes, smooth(nodes))
-    with pytest.raises(InputError, match=r"without node 30 of 31 at \[0\.3 1\. \]"):
-        spline.leave_one_out()
-
-
 def test_with_the_unit_box_the_unit_does_not_matter():
     nodes, theta = square_grid(5), queries()
     in_radians = BiharmonicSpline.fit(nodes, smooth(nodes))(theta)
@@ -180,5 +150,3 @@ def test_the_nearest_nodes_that_are_allowed_still_give_a_sound_spline():
     np.testing.assert_allclose(spline(nodes), smooth(nodes), atol=1e-9)
     # The pair fixes the slope at one place: the surface changes by no more than it was off there.
     np.testing.assert_allclose(spline(queries()), without(queries()), atol=2e-3)
-    expected = without(nodes[-1]) - smooth(nodes[-1])
-    np.testing.assert_allclose(spline.leave_one_out()[-1], expected, atol=1e-9)

@@ -74,17 +74,6 @@ def test_inverse_names_a_normal_out_of_reach():
     assert str(np.round(nowhere[0], 6).tolist()) in str(caught.value)
 
 
-@pytest.mark.parametrize("normal", [[0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], [0.0, np.inf, 1.0]])
-def test_inverse_refuses_what_is_no_direction(normal):
-    with pytest.raises(InputError, match="is not a direction"):
-        C_HORIZONTAL.inverse(np.array([Z, normal]))
-
-
-def test_inverse_near_refuses_a_start_that_is_not_finite():
-    with pytest.raises(InputError, match="not finite"):
-        C_HORIZONTAL.inverse_near(Z, np.array([0.0, np.nan]))
-
-
 @pytest.mark.parametrize(
     ("axes", "message"),
     [

@@ -140,7 +140,7 @@ BAD_LOADS = {
 def test_a_bad_load_gives_no_prediction_and_a_reason(graph, predictor, wrench, frame, reason, then):
     graph.load(SECOND, wrench, frame)
     graph.until(
-        lambda: len(predictor.stream.loads) or predictor.health.faults, "answer to the load"
+        lambda: predictor.stream.loads.newest_ns or predictor.health.faults, "answer to the load"
     )
     graph.joints("/joint_states", SECOND + 1)
     graph.status(NAME, lambda status, values: f"refused {reason}" in values)

@@ -62,7 +62,7 @@ class SupervisorSettings:
 
 @dataclass(frozen=True)
 class Supervision:
-    """What the supervisor believed at a moment."""
+    """What the supervisor believes, to be shown."""
 
     state: State  # by the operators' names
     text: str  # why the correction is restricted; empty where it is not
@@ -72,9 +72,6 @@ class Supervision:
     # yielded to a contact or is not certain [-]
     share: float
     valid: bool  # whether the load is known and corrected for, so that the residual holds
-    # `stamp_ns`, `since_ns`: of the last command, and of the one at which the state began [ns]
-    stamp_ns: int
-    since_ns: int
 
 
 RAMP_S = 1.0

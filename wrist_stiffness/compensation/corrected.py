@@ -97,14 +97,11 @@ class CorrectedBlock:
             doubt = np.where(rows[3], 0.0, NOT_MEASURED)[:, None, None] * np.eye(6)
             return [(rows[0], rows[1] + doubt)]
         # One by one: a stack of products may round otherwise.
-        each = [_left(*row, tool_point) for row in zip(*rows, strict=True)]
-        return [
-            (
-                np.array([residuals[place][0] for residuals in each]).reshape(-1, 6),
-                np.array([residuals[place][1] for residuals in each]).reshape(-1, 6, 6),
-            )
-            for place in range(2)
-        ]
+        twists, covariances = np.empty((2, len(own), 6)), np.empty((2, len(own), 6, 6))
+        for i, row in enumerate(zip(*rows, strict=True)):
+            for place, left in enumerate(_left(*row, tool_point)):
+                twists[place, i], covariances[place, i] = left
+        return list(zip(twists, covariances, strict=True))
 
 
 def _left(

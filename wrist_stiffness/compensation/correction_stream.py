@@ -103,7 +103,8 @@ class CorrectionStream(Stream):
     def use_zero(self, zero: Zero | None) -> None:
         """Tare, and judge the load anew."""
         super().use_zero(zero)
-        self.supervisor.restore(None)
+        self.supervisor.forget()
+        self.supervisor.declare_payload(None)
         scatter = np.zeros(6) if zero is None else SCATTERS * zero.scatter
         self.supervisor.scatter = Thresholds(*scatter.reshape(2, 3).max(axis=1).tolist())
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import lru_cache
 from math import isfinite
 from typing import Any, Literal
 
@@ -26,9 +26,6 @@ from wrist_stiffness.topics import BASE_FRAME, PLATFORM_FRAME
 
 JOINT_STATE, COMMAND = "joint state", "command"
 
-MOST_NAMES = 32
-"""Lists of names whose places are kept."""
-
 
 @dataclass(frozen=True)
 class MotorNames:
@@ -43,14 +40,7 @@ class MotorNames:
         `names`: in any order, other joints ignored; `what`: what the names are of, for the message.
         Raises `InputError` if a motor is missing or named twice.
         """
-        names = tuple(names)
-        known = self._known.get(names)
-        if known is None:
-            # A stream says the same names in every message.
-            if len(self._known) >= MOST_NAMES:
-                self._known.clear()
-            known = self._known[names] = self._found(names, what)
-        return known
+        return _places((self.motor_1, self.motor_2), tuple(names), what)
 
     def angles(
         self, names: Sequence[str], positions: Sequence[float], what: str = JOINT_STATE
@@ -81,21 +71,17 @@ class MotorNames:
         speeds = np.array([velocities[place] for place in self.places(names)], dtype=float)
         return speeds if np.all(np.isfinite(speeds)) else None
 
-    @cached_property
-    def _known(self) -> dict[tuple[str, ...], tuple[int, int]]:
-        """Places by the names of a message."""
-        return {}
 
-    def _found(self, names: tuple[str, ...], what: str) -> tuple[int, int]:
-        found = []
-        for motor in (self.motor_1, self.motor_2):
-            count = names.count(motor)
-            if count != 1:
-                count_text = "is missing" if count == 0 else f"is named {count} times"
-                listed = ", ".join(names) or "no names"
-                raise InputError(f"{what}: {motor} {count_text} among {listed}")
-            found.append(names.index(motor))
-        return found[0], found[1]
+# A stream says the same names in every message.
+@lru_cache(maxsize=32)
+def _places(motors: tuple[str, str], names: tuple[str, ...], what: str) -> tuple[int, int]:
+    for motor in motors:
+        count = names.count(motor)
+        if count != 1:
+            count_text = "is missing" if count == 0 else f"is named {count} times"
+            listed = ", ".join(names) or "no names"
+            raise InputError(f"{what}: {motor} {count_text} among {listed}")
+    return names.index(motors[0]), names.index(motors[1])
 
 
 FRAME_PREFIX = re.compile("([A-Za-z0-9_][A-Za-z0-9_/]*)?")
@@ -213,18 +199,6 @@ class Frames:
         return frame
 
 
-def _sensor_frame(
-    parent: str,
-    position: Array | None = None,
-    rpy: Array | None = None,
-    acts_on: Literal["platform", "environment"] = "platform",
-) -> SensorFrame:
-    turned = Rotation.from_euler("xyz", np.zeros(3) if rpy is None else rpy)
-    return SensorFrame(
-        parent, turned.as_matrix(), np.zeros(3) if position is None else position, acts_on
-    )
-
-
 FRAME = record(
     {"parent": text(BASE_FRAME, PLATFORM_FRAME)},
     {
@@ -232,7 +206,9 @@ FRAME = record(
         "rpy_deg": Quantity(vector()),
         "acts_on": text("platform", "environment"),
     },
-    make=_sensor_frame,
+    make=lambda rpy=(0.0, 0.0, 0.0), **others: SensorFrame(
+        rotation=Rotation.from_euler("xyz", rpy).as_matrix(), **others
+    ),
 )
 
 

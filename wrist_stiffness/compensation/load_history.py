@@ -67,10 +67,6 @@ class LoadHistory:
     def _age_limit_ns(self) -> int:
         return round(self.age_limit_s * NANOSECONDS)
 
-    def __len__(self) -> int:
-        """Return how many loads are kept."""
-        return len(self._stamps)
-
     @property
     def newest_ns(self) -> int | None:
         """Newest stamp [ns], None where no load has arrived."""
@@ -163,19 +159,6 @@ class LoadHistory:
         newest = self._stamps[-1] if self._stamps else stamps[0] - 1
         return bool(stamps[0] > newest and (np.diff(stamps) > 0).all())
 
-    def extend(
-        self, stamps: NDArray[np.int64], wrenches: NDArray[np.float64], on_platform: bool
-    ) -> None:
-        """Keep loads (k, 6) that rise (see `rises_with`), as `add` would one after the other."""
-        load_served_ns, served_ns = self._served_ns
-        self.late += int(np.count_nonzero((load_served_ns < stamps) & (stamps <= served_ns)))
-        for begin in range(0, len(stamps), self.CAPACITY):
-            part = slice(begin, begin + self.CAPACITY)
-            rows = self._room(len(stamps[part]))
-            self._wrench[rows], self._on_platform[rows] = wrenches[part], on_platform
-            self._stamps += stamps[part].tolist()
-            self._forget()
-
     def block_at(self, stamps: NDArray[np.int64]) -> tuple[Array, Flags, Flags]:
         """Return the loads (n, 6) that belong to stamps (n,) [ns], which are in U, which are there.
 
@@ -233,18 +216,27 @@ class LoadHistory:
     ) -> list[WristError]:
         """Take in wrench messages of one frame and return why some cannot be used.
 
-        `stamps` (k,) int [ns]; `wrenches` (k, 6): force and moment [N, N m].
+        At once where nothing stands against it, else by `add` one after the other, with the same
+        result.  `stamps` (k,) int [ns]; `wrenches` (k, 6): force and moment [N, N m].
         """
-        finite = bool(np.isfinite(wrenches).all())
-        if finite and self.rises_with(stamps) and self.frames.is_at_origin(frame_id):
-            self.extend(stamps, wrenches, self.frames.turns(frame_id))
-            return []
         faults: list[WristError] = []
-        for stamp_ns, wrench in zip(stamps.tolist(), wrenches.tolist(), strict=True):
-            try:
-                self.add(stamp_ns, frame_id, wrench[:3], wrench[3:])
-            except WristError as error:
-                faults.append(error)
+        finite = bool(np.isfinite(wrenches).all())
+        if not (finite and self.rises_with(stamps) and self.frames.is_at_origin(frame_id)):
+            for stamp_ns, wrench in zip(stamps.tolist(), wrenches.tolist(), strict=True):
+                try:
+                    self.add(stamp_ns, frame_id, wrench[:3], wrench[3:])
+                except WristError as error:
+                    faults.append(error)
+            return faults
+        load_served_ns, served_ns = self._served_ns
+        self.late += int(np.count_nonzero((load_served_ns < stamps) & (stamps <= served_ns)))
+        for begin in range(0, len(stamps), self.CAPACITY):
+            part = slice(begin, begin + self.CAPACITY)
+            rows = self._room(len(stamps[part]))
+            self._wrench[rows] = wrenches[part]
+            self._on_platform[rows] = self.frames.turns(frame_id)
+            self._stamps += stamps[part].tolist()
+            self._forget()
         return faults
 
 

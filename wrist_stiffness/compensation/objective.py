@@ -13,7 +13,7 @@ import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.vectors import frame_about, skew
+from wrist_stiffness.mechanism.vectors import IDENTITY, skew
 
 DEPENDENT = 1e-6
 """The motors' columns of the task are dependent below this ratio of their singular values."""
@@ -33,15 +33,18 @@ class Objective:
     tool_point: Array  # (3,), in U [m]
 
     def matrix(self, configuration: Configuration) -> Array:
-        """Return the matrix from a residual twist at O in F to the task error, (2 or 3, 6)."""
+        """Return the matrix from a residual twist at O in F to the task error, (3, 6)."""
+        matrix = np.zeros((3, 6))
         if self.name == "tool_point":
-            point = configuration.platform @ self.tool_point
-            return np.hstack([np.eye(3), -skew(point)])
-        rotation = np.eye(3)
+            matrix[:, :3] = IDENTITY
+            matrix[:, 3:] = skew(-configuration.platform.dot(self.tool_point))
+        else:
+            matrix[:, 3:] = IDENTITY
         if self.name == "pointing":
-            normal = configuration.platform @ self.normal
-            rotation = frame_about(normal)[:, 1:].T
-        return np.hstack([np.zeros_like(rotation), rotation])
+            # Turns about the normal do not count.
+            normal = configuration.platform.dot(self.normal)
+            matrix[:, 3:] -= normal[:, None] * normal
+        return matrix
 
     def cancelling(self, configuration: Configuration, jacobian: Array) -> Array:
         """Return the matrix from a residual twist at O in F to the motor angles that cancel it.
@@ -50,18 +53,8 @@ class Objective:
         the task's `matrix` M and the twists J of the motors, for the least squares; no motion where
         the motors do not reach the task.
         """
-        matrix = np.zeros((2, 6))
-        if self.name == "tool_point":
-            point = skew(configuration.platform @ self.tool_point)
-            matrix[:, :3] = inverse = pseudo_inverse(-point @ jacobian)
-            matrix[:, 3:] = -inverse @ point
-        else:
-            if self.name == "pointing":
-                # Turns about the normal do not count.
-                normal = configuration.platform.dot(self.normal)
-                jacobian = jacobian - normal[:, None] * normal.dot(jacobian)
-            matrix[:, 3:] = pseudo_inverse(jacobian)
-        return matrix
+        matrix = self.matrix(configuration)
+        return pseudo_inverse(matrix[:, 3:].dot(jacobian)).dot(matrix)
 
 
 def pseudo_inverse(columns: Array) -> Array:

@@ -19,8 +19,7 @@ is applied says `share`: less where a contact works against it, and all of it on
 model is trusted (`SupervisorSettings.trust`).
 
 For the nodes: `declare_payload(Payload | None)` is what a gripper tells, `forget()` begins anew,
-`supervision` is what is believed, to be shown and stored, `restore(payload)` expects a stored
-payload: it counts once the load agrees.
+`supervision` is what is believed.
 """
 
 from __future__ import annotations
@@ -79,11 +78,6 @@ class Supervisor(Belief):
             self._enter(RELEASED if payload is None else UNSURE)
         self._expected, self.told = payload, payload is not None
 
-    def restore(self, payload: Payload | None) -> None:
-        """Begin anew and expect a payload that was stored: it counts as soon as the load agrees."""
-        self.forget()
-        self._expected, self.told = payload, False
-
     def lost(self) -> None:
         """Hear that no load is known: the payload must be seen again."""
         self._expect()
@@ -126,7 +120,6 @@ class Supervisor(Belief):
             bool(self.told) and payload is not None,
             self.part,
             self.valid,
-            *self.stamps.tolist(),
         )
 
     @property

@@ -8,11 +8,10 @@ from importlib.metadata import version
 
 import numpy as np
 
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.fem.condensed_store import PACKAGES, CondensedSolid, condense_solid
 from wrist_stiffness.fem.parts import RINGS, Part, Solid, wrist_parts
 from wrist_stiffness.fem.solids import FLANGES, MeshSettings
-from wrist_stiffness.fem.superelement import INTERFACES, Interface, Superelement
+from wrist_stiffness.fem.superelement import Interface, Superelement
 from wrist_stiffness.mechanism.components import (
     LINKS,
     PASSIVE_JOINTS,
@@ -22,6 +21,7 @@ from wrist_stiffness.mechanism.components import (
 from wrist_stiffness.mechanism.geometry import BushingDimensions, Geometry
 from wrist_stiffness.mechanism.pins import in_series, pin_flexibilities
 from wrist_stiffness.mechanism.vectors import skew
+from wrist_stiffness.progress import Progress, silent
 
 SHIPPED_SIZES = MeshSettings(
     link=1.2e-3, bore=0.8e-3, bushing=0.5e-3, bushing_corner=0.02e-3, bushing_arc=1.4e-3
@@ -30,9 +30,6 @@ SHIPPED_SIZES = MeshSettings(
 
 Condenser = Callable[[Solid, MeshSettings, Interface], CondensedSolid]
 """Makes the superelement of a solid."""
-
-PartProgress = Callable[[int, int, str], None]
-"""Called with the number of parts done, the number of all parts, and what comes next."""
 
 
 @dataclass(frozen=True)
@@ -49,28 +46,24 @@ def elastic_components(
     geometry: Geometry,
     sizes: MeshSettings = SHIPPED_SIZES,
     interface: Interface = "rigid",
-    progress: PartProgress | None = None,
+    progress: Progress = silent,
     condenser: Condenser = condense_solid,
     rings: int = RINGS,
 ) -> tuple[ElasticComponents, Provenance]:
     """Condense every elastic part of a wrist.
 
-    `interface`: how walls follow their frames; `progress`: see `PartProgress`; `condenser`:
-    `condense_solid`, or a `CondensedStore` that remembers; `rings`: contact modes over the width of
-    a flange.  Gives `ElasticComponents`: at O in F with the wrist at home.  Raises `GeometryError`
-    if a part cannot be built; `InputError` if the interface model is unknown.
+    `interface`: how walls follow their frames; `progress`: called with parts done and in all;
+    `condenser`: `condense_solid`, or a `CondensedStore` that remembers; `rings`: contact modes over
+    the width of a flange.  Gives `ElasticComponents`: at O in F with the wrist at home.  Raises
+    `GeometryError` if a part cannot be built.
     """
-    if interface not in INTERFACES:
-        raise InputError(f"interface model '{interface}' is not one of {', '.join(INTERFACES)}")
     parts = wrist_parts(geometry, rings)
     condensed: dict[Solid, CondensedSolid] = {}
     for done, part in enumerate(parts):
-        if progress is not None:
-            progress(done, len(parts), part.name)
+        progress(done, len(parts))
         if part.solid not in condensed:
             condensed[part.solid] = condenser(part.solid, sizes, interface)
-    if progress is not None:
-        progress(len(parts), len(parts), "done")
+    progress(len(parts), len(parts))
     provenance = Provenance(
         nodes={part.name: condensed[part.solid].nodes for part in parts},
         elements={part.name: condensed[part.solid].elements for part in parts},

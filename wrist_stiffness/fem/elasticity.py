@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 from skfem import Basis, ElementTetP2, ElementTriP2
+from skfem.models.poisson import mass
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
@@ -97,12 +98,7 @@ def _gradients(mesh: SolidMesh) -> tuple[Array, Array]:
 
 def mass_matrix(mesh: SolidMesh, density: float) -> sparse.csr_matrix:
     """Return the consistent mass between the nodes, the same along x, y and z, (n, n) [kg]."""
-    basis = Basis(mesh.tets, ElementTetP2(), intorder=LOAD_ORDER)
-    shape = np.array([np.broadcast_to(np.asarray(f[0]), basis.dx.shape) for f in basis.basis])
-    block = density * np.einsum("ieq,jeq,eq->eij", shape, shape, basis.dx)
-    rows = np.repeat(mesh.elements, 10, axis=1).ravel()
-    columns = np.tile(mesh.elements, (1, 10)).ravel()
-    return sparse.csr_matrix((block.ravel(), (rows, columns)), shape=(len(mesh.nodes),) * 2)
+    return density * mass.assemble(Basis(mesh.tets, ElementTetP2(), intorder=LOAD_ORDER))
 
 
 def surface_integrals(mesh: SolidMesh, surface: str) -> Array:

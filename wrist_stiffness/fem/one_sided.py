@@ -47,15 +47,7 @@ SUSPENSION = np.repeat([1e-2, 1e-5], 3)
 """Springs that hold each frame to the ground, so that a pin that rattles in its clearance is found
 where it comes to rest [N/m, N m/rad]; ten million times softer than a wrist."""
 
-FRAMES = (
-    "link_1_root",
-    "link_1_tip",
-    "link_2_root",
-    "link_2_tip",
-    "link_3_root",
-    "link_3_tip",
-    "platform",
-)
+FRAMES = (*(f"{link}_{end}" for link in LINKS for end in ("root", "tip")), "platform")
 """Rigid frames: the pin or hub at each end of each link, and the platform."""
 
 HUB = {"joint_2": "platform", "joint_3": "platform", "joint_4": "link_3_root"}
@@ -279,9 +271,7 @@ class _Spring:
             pulls=(bushing.surface == "wall") & (not lifts),
         )
 
-    def press(
-        self, moved: Array, guess: NDArray[np.bool_] | None
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    def press(self, moved: Array, guess: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the forces of the patches for a motion of all frames, and which touch."""
         apart = self.gap + self.wrench.T @ (self.across @ moved)
         if not self.pulls.any():
@@ -293,7 +283,7 @@ class _Spring:
         force[pushes], held[pushes] = solve_contact(
             self.flexibility[np.ix_(pushes, pushes)] - cross.T @ by_pulling[:, :-1],
             apart[pushes] - cross.T @ by_pulling[:, -1],
-            None if guess is None else guess[pushes],
+            guess[pushes],
         )
         force[pulls] = -by_pulling @ np.append(force[pushes], 1.0)
         return force, held

@@ -14,7 +14,6 @@ from skfem import MeshTet2
 
 from wrist_stiffness.fem.mesh import SolidMesh, generate_mesh, match_facets
 from wrist_stiffness.fem.solids import FLANGES, MILLIMETRES
-from wrist_stiffness.mechanism.components import Array
 
 SECTORS = 4
 """Contact sectors of each ring of a flange, equal in angle, counted from the bushing's x towards
@@ -63,9 +62,10 @@ def revolve(section: OCCGeometry, arcs_per_sector: int) -> SolidMesh:
     unique, middle_of = np.unique(np.sort(pairs % wrap, axis=1), axis=0, return_inverse=True)
     first = np.zeros(len(unique), dtype=np.int64)
     first[middle_of] = np.arange(len(middle_of))
-    nodes = _cartesian(np.concatenate([cylindrical[:wrap], middles[first]]))
+    radius, height, angle = np.concatenate([cylindrical[:wrap], middles[first]]).T
+    nodes = np.stack([radius * np.cos(angle), radius * np.sin(angle), height])
     elements = np.column_stack([tets % wrap, wrap + middle_of.reshape(-1, 6)])
-    mesh = MeshTet2(nodes.T, elements.T)
+    mesh = MeshTet2(nodes, elements.T)
 
     surfaces = {}
     sector_of = np.tile(np.arange(arcs) // arcs_per_sector, (2, 1)).T.ravel()
@@ -86,9 +86,3 @@ def _sweep(cells: NDArray[np.int64], count: int, arcs: int) -> NDArray[np.int64]
     """Corners of the swept cells (cell by cell, arc by arc): start of the arc, then its end."""
     start = cells[:, None, :] + count * np.arange(arcs)[None, :, None]
     return np.concatenate([start, start + count], axis=2).reshape(-1, 2 * cells.shape[1])
-
-
-def _cartesian(cylindrical: Array) -> Array:
-    """Places (n, 3) from radius, height and angle."""
-    radius, height, angle = cylindrical.T
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])

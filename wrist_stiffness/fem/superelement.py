@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import qr
 
@@ -26,7 +25,6 @@ from wrist_stiffness.fem.parts import ElasticBody
 from wrist_stiffness.mechanism.components import Array
 
 Interface = Literal["rigid", "distributing", "sliding"]
-INTERFACES: tuple[Interface, ...] = ("rigid", "distributing", "sliding")
 
 ALL_WAYS = (0, 1, 2)
 RADIALLY = (0,)
@@ -84,6 +82,8 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
         flexibility[carried] = _inverse(stiffness[6:, 6:][carried])
         on_motor, on_platform = on_frames[:6], on_frames[6:]
     sector_screw = flexibility @ on_platform[:, 3:]
+    # Of the nodes as they move by each shape.
+    momentum = body.mass @ shape.reshape(len(body.mesh.nodes), -1)
     return Superelement(
         flexibility=flexibility,
         weight_motor_side=on_motor[:, :3],
@@ -92,7 +92,7 @@ def condense(body: ElasticBody, interface: Interface) -> Superelement:
         sector_screw=sector_screw,
         sector_approach=_symmetric(inner[3:, 3:] + on_platform[:, 3:].T @ sector_screw),
         sector_weight=inner[3:, :3],
-        mass=_moving_mass(body, shape),
+        mass=_symmetric(shape.T @ momentum.reshape(shape.shape)),
     )
 
 
@@ -107,8 +107,12 @@ def frame_stiffness(
     work of each load along each load's displacements with both frames held; `shape` (3 n, 12):
     displacements of the nodes by the frames' unit screws.
     """
-    axes = _axes(body)
-    rigid = axes.T @ rigid_motion(body.mesh.nodes)
+    mesh = body.mesh
+    # Cylindrical at the nodes of a bushing, the solid's own at those of a link.
+    axes = sparse.csr_matrix(sparse.eye(3 * len(mesh.nodes)))
+    if body.solid.is_bushing:
+        axes = cylindrical_axes(mesh.nodes)
+    rigid = axes.T @ rigid_motion(mesh.nodes)
     motion = np.zeros((len(rigid), 12))
     held = np.zeros(len(rigid), dtype=bool)
     walls = (
@@ -116,41 +120,24 @@ def frame_stiffness(
         (body.solid.platform_wall, RADIALLY if slides else ALL_WAYS),
     )
     for side, (wall, ways) in enumerate(walls):
-        unknowns = (3 * body.mesh.surface_nodes(wall)[:, None] + np.array(ways)).ravel()
+        unknowns = (3 * mesh.surface_nodes(wall)[:, None] + np.array(ways)).ravel()
         carried = np.array(ALL if ways == ALL_WAYS else ACROSS)
         motion[np.ix_(unknowns, 6 * side + carried)] = rigid[np.ix_(unknowns, carried)]
         held[unknowns] = True
     free = np.flatnonzero(~held)
     pull, loads = axes.T @ (body.stiffness @ (axes @ motion)), axes.T @ loads
-    solution = _factorise_inside(body, axes, free).solve(np.hstack([pull, loads])[free])
+    factor: CyclicFactor | Factor
+    if mesh.slices > 1:
+        factor = factorise_cyclic(body.stiffness, axes, mesh.nodes, free, mesh.slices)
+    else:
+        factor = factorise((axes.T @ body.stiffness @ axes)[free][:, free], free)
+    solution = factor.solve(np.hstack([pull, loads])[free])
     by_frames, by_loads = solution[:, :12], solution[:, 12:]
     stiffness = _symmetric(motion.T @ pull - pull[free].T @ by_frames)
     on_frames = motion.T @ loads - pull[free].T @ by_loads
     inner = _symmetric(loads[free].T @ by_loads)
     motion[free] -= by_frames
     return stiffness, on_frames, inner, axes @ motion
-
-
-def _moving_mass(body: ElasticBody, shape: Array) -> Array:
-    """Mass of a body whose nodes move by shapes (3 n, k), (k, k)."""
-    by_node = shape.reshape(len(body.mesh.nodes), -1)
-    return _symmetric(shape.T @ (body.mass @ by_node).reshape(shape.shape))
-
-
-def _axes(body: ElasticBody) -> sparse.csr_matrix:
-    """Cylindrical axes at the nodes of a bushing, the solid's own at those of a link."""
-    if body.solid.is_bushing:
-        return cylindrical_axes(body.mesh.nodes)
-    return sparse.csr_matrix(sparse.eye(3 * len(body.mesh.nodes)))
-
-
-def _factorise_inside(
-    body: ElasticBody, axes: sparse.csr_matrix, free: NDArray[np.int64]
-) -> CyclicFactor | Factor:
-    mesh = body.mesh
-    if mesh.slices > 1:
-        return factorise_cyclic(body.stiffness, axes, mesh.nodes, free, mesh.slices)
-    return factorise((axes.T @ body.stiffness @ axes)[free][:, free], free)
 
 
 def _condense_distributing(

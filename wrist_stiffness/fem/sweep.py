@@ -83,7 +83,7 @@ def build_table(
             geometry,
             sizes,
             settings.interface,
-            lambda done, of, name: progress(done, steps),
+            lambda done, of: progress(done, steps),
             condenser,
             rings,
         )
@@ -143,7 +143,7 @@ def build_table(
                 "contact_relative": worst["contact"],
                 "walls_relative": worst["walls"],
                 **{name: budget[name] for name in ("mesh", "contact", "walls")},
-                **errors,
+                "predicted": errors,
             },
         ),
     )
@@ -165,7 +165,7 @@ def _on_grid(header: TableHeader, components: ElasticComponents, geometry: Geome
 
 
 def _worst(errors: Mapping[str, Any], region: str) -> float:
-    return max(errors["predicted"][region].values())
+    return max(errors[region].values())
 
 
 def _meets(errors: Mapping[str, Any], tolerance: float) -> bool:

@@ -1,4 +1,4 @@
-"""Biharmonic spline over two joint angles, with its leave-one-out error.
+"""Biharmonic spline over two joint angles.
 
 After Sandwell (1987), "Biharmonic spline interpolation of GEOS-3 and SEASAT altimeter data":
 the surface is a sum of Green's functions of the biharmonic operator, centred on the nodes.  With r
@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import inv, solve
+from scipy.linalg import solve
 
 from wrist_stiffness.errors import InputError
 
@@ -93,28 +93,6 @@ class BiharmonicSpline:
             values += self.coefficients[count] + part @ self.coefficients[count + 1 :]
             result[block] = values
         return result.reshape(*theta.shape[:-1], result.shape[1])
-
-    def leave_one_out(self) -> NDArray[np.float64]:
-        """Error at every node of the spline through the other nodes, in the same unit box.
-
-        Closed form from the inverse A^-1 of the system matrix (Rippa 1999): coefficient i over
-        element (i, i) of A^-1, for all nodes and columns at the cost of one inverse.
-
-        Gives (n, m): prediction from the other nodes minus the value [unit of the values].  Raises
-        `InputError`: the nodes that remain without some node cannot carry a spline (too few, or on
-        a line).
-        """
-        count = len(self.nodes)
-        inverse = inv(_system_matrix(self._scaled_nodes.T))
-        diagonal = np.diagonal(inverse)[:count]
-        weakest = int(np.argmin(np.abs(diagonal)))
-        # det(A without i) / det(A): zero up to rounding where node i cannot be spared.
-        if abs(diagonal[weakest]) <= 1e-14 * np.abs(inverse[:count, :count]).max():
-            raise InputError(
-                f"leave-one-out: without node {weakest} of {count} at {self.nodes[weakest]} rad "
-                "the others carry no spline"
-            )
-        return -self.coefficients[:count] / diagonal[:, None]
 
 
 def _kernel(dx: NDArray[np.float64], dy: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -58,14 +58,11 @@ def fit_platform_error(points_undeformed: ArrayLike, points_deformed: ArrayLike)
     coordinates is added.
 
     `points_undeformed` (n, 3) or (..., n, 3): readout points of the rigid wrist in F [m], one set
-    for all, or one per pose; `points_deformed` (..., n, 3): the same points under load in F [m].
-    Raises `InputError`: fewer than four points, or points near a plane (sigma_min / sigma_max of
-    the centred points below `MIN_SPREAD_RATIO`).
+    for all, or one per pose, four or more and not near a plane, as every geometry's are;
+    `points_deformed` (..., n, 3): the same points under load in F [m].
     """
     undeformed = np.asarray(points_undeformed, dtype=float)
     deformed = np.asarray(points_deformed, dtype=float)
-    _require_spread(undeformed, 3, "readout points", "they lie near a plane")
-
     displacement = deformed - undeformed
     gradient = np.swapaxes(np.linalg.pinv(_centred(undeformed)) @ displacement, -1, -2)  # Eq. (4)
     rotation = _nearest_rotation(np.eye(3) + gradient)  # Eq. (5)
@@ -85,8 +82,8 @@ def fit_markers(points_reference: ArrayLike, points_measured: ArrayLike) -> Plat
     measured = np.asarray(points_measured, dtype=float)
     seen = ~np.isnan(measured).any(axis=-1)
     reference, measured = reference[seen], measured[seen]
-    _require_spread(reference, 2, "reference markers", "they lie near a line")
-    _require_spread(measured, 2, "measured markers", "they lie near a line")
+    _require_spread(reference, "reference markers")
+    _require_spread(measured, "measured markers")
 
     rotation = Rotation.align_vectors(_centred(measured), _centred(reference))[0].as_matrix()
     turned = reference.mean(axis=0) @ (rotation - np.eye(3)).T
@@ -105,15 +102,14 @@ def _nearest_rotation(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return u @ vt
 
 
-def _require_spread(points: NDArray[np.float64], dimensions: int, what: str, fault: str) -> None:
-    """Reject points whose extent in the given number of dimensions is too small for a fit."""
-    count = points.shape[-2]
-    if count < dimensions + 1:
-        raise InputError(f"{what}: {count} given; at least {dimensions + 1} needed")
-    sigma = np.linalg.svd(_centred(points), compute_uv=False)
-    largest = np.maximum(sigma[..., 0], np.finfo(float).tiny)
-    ratio = float(np.min(sigma[..., dimensions - 1] / largest))
+def _require_spread(points: NDArray[np.float64], what: str) -> None:
+    """Reject points (n, 3) of which a line does not tell all three rotations."""
+    if len(points) < 3:
+        raise InputError(f"{what}: {len(points)} given; at least 3 needed")
+    largest, second, _ = np.linalg.svd(_centred(points), compute_uv=False)
+    ratio = second / max(largest, np.finfo(float).tiny)
     if ratio < MIN_SPREAD_RATIO:
         raise InputError(
-            f"{what}: {fault}: ratio of singular values {ratio:.3g}, limit {MIN_SPREAD_RATIO}"
+            f"{what}: they lie near a line: ratio of singular values {ratio:.3g}, "
+            f"limit {MIN_SPREAD_RATIO}"
         )

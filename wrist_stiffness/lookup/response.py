@@ -6,6 +6,7 @@ xi = C W + weight twist + B lambda
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from wrist_stiffness.lookup.readout import fit_platform_error
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
-from wrist_stiffness.mechanism.contact import solve_contact, solve_contacts
+from wrist_stiffness.mechanism.contact import solve_contacts
 from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.mechanism.statics import ContactOperators
 from wrist_stiffness.mechanism.vectors import cross
@@ -37,12 +38,9 @@ def respond(operators: ContactOperators, wrench: Array) -> Response:
     """
     free = operators.weight_twist + np.einsum("...ij,...j->...i", operators.compliance, wrench)
     gap = operators.gap + np.einsum("...im,...i->...m", operators.force_twist, wrench)
-    if gap.ndim == 1:
-        force, active = solve_contact(operators.approach, gap)
-    else:
-        m, n = gap.shape[-1], int(np.prod(gap.shape[:-1]))
-        force, active = solve_contacts(operators.approach.reshape(n, m, m), gap.reshape(n, m))
-        force, active = force.reshape(gap.shape), active.reshape(gap.shape)
+    m, n = gap.shape[-1], math.prod(gap.shape[:-1])
+    found = solve_contacts(operators.approach.reshape(n, m, m), gap.reshape(n, m))
+    force, active = (each.reshape(gap.shape) for each in found)
     moved = free + np.einsum("...im,...m->...i", operators.force_twist, force)
     return Response(moved, force, active)
 

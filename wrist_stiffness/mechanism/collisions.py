@@ -22,16 +22,6 @@ POINTS_PER_SECTION = 2
 
 
 @dataclass(frozen=True)
-class Collision:
-    """Two bodies in one place."""
-
-    # `first`, `second`: a link, a pin by its joint, the platform or `BOSS`
-    first: str
-    second: str
-    theta: Array  # (2,), motor angles [rad]
-
-
-@dataclass(frozen=True)
 class _Body:
     """A box in polar coordinates of its own (an arc, a disc, a pin): its points, its inside."""
 
@@ -65,13 +55,14 @@ class _Body:
         return np.asarray(np.all((own > self.lower) & (own < self.upper), axis=-1))
 
 
-def collision(geometry: Geometry, poses: Array) -> Collision | None:
-    """Return the first collision at some poses, None if there is none.
+def collision(geometry: Geometry, poses: Array) -> tuple[str, str, Array] | None:
+    """Return two bodies that are in one place at some pose, and its motor angles; None if none are.
 
     Bars may hit bars, the plate, the boss of another one and the pins of joints that are not
     theirs; hubs of the platform are not described, and what a joint connects may touch there.
 
-    `poses` (n, 2): motor angles [rad].
+    `poses` (n, 2): motor angles [rad].  Gives a link, then a link, a pin by its joint, `platform`
+    or `BOSS`, and (2,) [rad].
     """
     turns = mechanism_of(geometry).forward(poses).rotations
     bars = {name: _bar(geometry, name) for name in LINKS}
@@ -95,7 +86,7 @@ def collision(geometry: Geometry, poses: Array) -> Collision | None:
             turned = np.swapaxes(turns[body.carrier], -1, -2) @ turns[bodies[inner].carrier]
             hit = body.contains(points[inner][near] @ np.swapaxes(turned, -1, -2)).any(axis=-1)
             if hit.any():
-                return Collision(first, second, poses[np.argmax(hit)])
+                return first, second, poses[np.argmax(hit)]
     return None
 
 

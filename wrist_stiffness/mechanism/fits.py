@@ -77,12 +77,12 @@ def check_fits(root: Node, geometry: Geometry) -> None:
         raise limits["singularity"].refuse(
             f"no pose of the operative workspace has such a |D|, up to {tilt:g} deg of tilt"
         )
-    found = collision(geometry, poses)
-    if found is not None:
-        node, name = _place_of(found.second, root, geometry)
+    if (found := collision(geometry, poses)) is not None:
+        first, second, theta = found
+        node, name = _place_of(second, root, geometry)
         raise node.refuse(
-            f"{name} and {found.first} are in one place at motor angles "
-            f"{angles_text(found.theta)}, in the operative workspace"
+            f"{name} and {first} are in one place at motor angles {angles_text(theta)}, in the "
+            "operative workspace"
         )
 
 

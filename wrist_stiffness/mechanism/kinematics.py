@@ -123,13 +123,6 @@ class Mechanism:
             )
 
     @cached_property
-    def alphas(self) -> Array:
-        """Link angles alpha_1 ... alpha_5 between (a1,b), (b,c), (c,d), (d,a2), (a1,a2) [rad]."""
-        u = np.array([self.a1, self.b0, self.c0, self.d0, self.a1])
-        v = np.array([self.b0, self.c0, self.d0, self.a2, self.a2])
-        return angle_between(u, v)
-
-    @cached_property
     def assembly_mode(self) -> float:
         """Return sigma = sign(c . (b x d)) at home: the branch of the closure, +1 or -1."""
         return float(np.sign(self.c0 @ np.cross(self.b0, self.d0)))
@@ -244,7 +237,7 @@ class Mechanism:
     def _refuse_open_loop(self, theta: Array, k: Array, gram: Array) -> None:
         wrong = ~(gram > GRAM_ROUNDING)
         angle = np.degrees(np.arccos(np.clip(first_where(k[..., None], wrong)[0], -1.0, 1.0)))
-        alpha_2, alpha_3 = np.degrees(self.alphas[1:3])
+        alpha_2, alpha_3 = np.degrees(np.arccos(self._cosines))
         raise UnreachablePoseError(
             f"motor angles {angles_text(first_where(theta, wrong))}: the loop does not close; the "
             f"angle between joint_2 and joint_4 is {angle:.3f} deg, it must lie between "
@@ -280,17 +273,10 @@ class Mechanism:
     def inverse(self, normal: Array) -> Array:
         """Inverse kinematics of a platform normal: all solutions of this assembly mode.
 
-        `normal` (..., 3): desired platform normals in F (any length but zero).  Gives (..., 4, 2):
-        motor angles in [-pi, pi]; rows that do not exist or belong to the other assembly mode are
-        NaN.  Raises `InputError` if a normal is not finite or has no length.
+        `normal` (..., 3): desired platform normals in F, of any length.  Gives (..., 4, 2): motor
+        angles in [-pi, pi]; rows that do not exist or belong to the other assembly mode are NaN.
         """
-        normal = np.asarray(normal, dtype=float)
-        wrong = ~(np.isfinite(normal).all(axis=-1) & (normal != 0.0).any(axis=-1))
-        if wrong.any():
-            bad = first_where(normal, wrong).tolist()
-            raise InputError(f"platform normal {bad} is not a direction")
-        # By the largest component first, so that squares neither overflow nor vanish.
-        n = unit(normal / np.max(np.abs(normal), axis=-1, keepdims=True))
+        n = unit(normal)
         cos_3 = self._cosines[1]
         platform_home = triad(self.b0, self.n0).T @ self.c0
         solutions = []
@@ -313,13 +299,9 @@ class Mechanism:
         """Inverse kinematics: the solution nearest to given motor angles.
 
         `normal` (..., 3): desired platform normals in F; `theta` (..., 2): where to stay near to
-        [rad].  Gives (..., 2): motor angles [rad].  Raises `InputError` if a normal is not a
-        direction or an angle is not finite; `UnreachablePoseError` if a normal has no solution.
+        [rad].  Gives (..., 2): motor angles [rad].  Raises `UnreachablePoseError` if a normal has
+        no solution.
         """
-        normal, theta = np.asarray(normal, dtype=float), np.asarray(theta, dtype=float)
-        if not np.isfinite(theta).all():
-            bad = first_where(theta, ~np.isfinite(theta).all(axis=-1))
-            raise InputError(f"motor angles {angles_text(bad)}: not finite")
         step = np.angle(np.exp(1j * (self.inverse(normal) - theta[..., None, :])))
         distance = np.where(np.isnan(step[..., 0]), np.inf, np.sum(step * step, axis=-1))
         unreachable = np.min(distance, axis=-1) == np.inf

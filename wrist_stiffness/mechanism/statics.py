@@ -44,16 +44,11 @@ def component_shares(configuration: Configuration, components: ElasticComponents
     """Share G_k C_k G_k' of each component in the platform's compliance.
 
     `configuration`: of shape (...).  Gives (..., 8, 6, 6): in the order of `ELASTIC`; symmetric
-    positive semi-definite; they add up to C.
+    positive semi-definite; they add up to C [m/N, rad/N, rad/(N m)].
     """
     g = influence(configuration).of_components()
     carried = block_diagonal(g @ component_rotations(configuration))
     return carried @ components.flexibility @ np.swapaxes(carried, -1, -2)
-
-
-def compliance(configuration: Configuration, components: ElasticComponents) -> Array:
-    """Platform compliance C(theta) with free slides, (..., 6, 6) [m/N, rad/N, rad/(N m)]."""
-    return component_shares(configuration, components).sum(axis=-3)
 
 
 def weight_wrench(

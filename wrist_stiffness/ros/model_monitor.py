@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
 
 from wrist_stiffness.compensation.measured_pose import NOT_MEASURED
-from wrist_stiffness.compensation.monitor_stream import MonitoredPose, MonitorStream
+from wrist_stiffness.compensation.monitor import MonitoredPose, MonitorStream
 from wrist_stiffness.compensation.parameters import MONITOR, POSE_TYPES, monitor_settings
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.ros.conversions import nanoseconds, pose_numbers, three

@@ -14,21 +14,12 @@ from importlib import import_module
 from types import FrameType
 from typing import NoReturn
 
-NODES = {
-    "pose_error_predictor": "PoseErrorPredictor",
-    "angle_corrector": "AngleCorrector",
-    "model_monitor": "ModelMonitor",
-    "cell_simulator": "CellSimulator",
-    "recorder": "Recorder",
-}
-"""Class of each node by its module."""
-
 
 def start(name: str) -> None:
-    """Load the module of a node by its name, and run the node."""
+    """Load the module of a node by its name, and run the node, a class of that name."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _end)
-    node = getattr(import_module(f"wrist_stiffness.ros.{name}"), NODES[name])
+    node = getattr(import_module(f"wrist_stiffness.ros.{name}"), name.title().replace("_", ""))
     import_module("wrist_stiffness.ros.run").run(node)
 
 

@@ -332,13 +332,9 @@ class WristNode(GuardedNode, ABC):
                 f"running model {running.name}; restart the node for another wrist"
             )
 
-        def use(model: ErrorModel | None) -> None:
-            self.stream.model = model
-
         def make() -> Callable[[], None]:
-            before = self.stream.model
-            use(model)
-            return partial(use, before)
+            before, self.stream.model = self.stream.model, model
+            return partial(setattr, self.stream, "model", before)
 
         return Change(model_text(model), make)
 

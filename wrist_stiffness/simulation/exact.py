@@ -195,15 +195,12 @@ class _System:
         push[_THROUGH] *= -1.0
         for step in range(MAX_STEPS):
             rest, tangent, gap = self._residual(z, force)
-            if len(force):
-                solved = np.linalg.solve(tangent, np.column_stack([rest, push]))
-                lopsided = self._approach / MICRO - pull @ solved[:, 1:]
-                approach = np.asarray(0.5 * (lopsided + lopsided.T))
-                offset = gap - pull @ solved[:, 0] - approach @ force
-                new, closed = solve_contact(approach, offset, closed)
-                change = np.asarray(-solved[:, 0] - solved[:, 1:] @ (new - force))
-            else:
-                new, change = force, np.asarray(-np.linalg.solve(tangent, rest))
+            solved = np.linalg.solve(tangent, np.column_stack([rest, push]))
+            lopsided = self._approach / MICRO - pull @ solved[:, 1:]
+            approach = np.asarray(0.5 * (lopsided + lopsided.T))
+            offset = gap - pull @ solved[:, 0] - approach @ force
+            new, closed = solve_contact(approach, offset, closed)
+            change = np.asarray(-solved[:, 0] - solved[:, 1:] @ (new - force))
             # Kinked laws can make full steps jump to and fro.
             share = 1.0 if step < FULL_STEPS else 0.3 if step < SHORT_STEPS else 0.1
             jump = new - force

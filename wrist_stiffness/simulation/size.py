@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
@@ -118,7 +117,8 @@ class Scale:
         self._residual = departure(without.measured_rotation, without.measured_shift, self._base)
         covariance = sample_covariance(table, without.encoder, settings.instrument)
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-        self.counted = self._loaded_or_moving(without)
+        moves = np.diff(without.encoder, axis=0, prepend=without.encoder[:1]).any(axis=1)
+        self.counted = moves | without.wrench.any(axis=1)
 
     def _run(self, hidden: tuple[HiddenEffect, ...]) -> CellSample:
         settings = replace(self._quiet, hidden=self._settings.hidden + hidden)
@@ -129,18 +129,12 @@ class Scale:
         ]
         return joined(blocks)
 
-    def _loaded_or_moving(self, sample: CellSample) -> NDArray[np.bool_]:
-        moving = np.any(np.diff(sample.encoder, axis=0, prepend=sample.encoder[:1]) != 0.0, axis=1)
-        return moving | np.any(sample.wrench != 0.0, axis=1)
-
     def signature(self, hidden: HiddenEffect) -> Array:
         """Return the change of the residual twist by an effect, (n, 6) [m, rad]."""
-        sample, without = self._run((hidden,)), self._without
-        base = self._base
-        for name in ("encoder", "wrench"):
-            if not np.array_equal(getattr(sample, name), getattr(without, name)):
-                base = base_pose(self._table, sample.encoder, sample.wrench)
-                break
+        sample, without, base = self._run((hidden,)), self._without, self._base
+        said = np.hstack([sample.encoder, sample.wrench])
+        if not np.array_equal(said, np.hstack([without.encoder, without.wrench])):
+            base = base_pose(self._table, sample.encoder, sample.wrench)
         return departure(sample.measured_rotation, sample.measured_shift, base) - self._residual
 
     def size(self, hidden: HiddenEffect) -> float:

@@ -37,12 +37,8 @@ class Law:
     component: str
 
     def __init__(self, component: str = "", **hooks: Callable[..., Any]) -> None:
-        known = {
-            name
-            for each in type(self).__mro__[:-1]
-            for name in (*vars(each), *each.__annotations__)
-            if not name.startswith("_")
-        }
+        own = {*dir(type(self)), *type(self).__annotations__}
+        known = {name for name in own if not name.startswith("_")}
         for name in hooks.keys() - known:
             raise InputError(f"{type(self).__name__}: no hook {name!r}{meant(name, known)}")
         self.component = component
