@@ -70,8 +70,8 @@ def xyz(prefix: str) -> tuple[str, ...]:
 def joint_rows(joints: tuple[str, ...]) -> Extract:
     """Return the extraction of named joints from joint states, in the order of the names.
 
-    `joints`: names; other joints are ignored.  Its rows have position, velocity and
-    effort, each (m, number of joints).
+    `joints`: names; other joints are ignored.  Its rows have position and velocity, each (m, number
+    of joints).
     """
 
     def extract(batch: Batch) -> Rows | str:
@@ -82,14 +82,10 @@ def joint_rows(joints: tuple[str, ...]) -> Extract:
             return IGNORED
         if len(found) < len(joints) or len(message.position) != len(message.name):
             return _MISSING_JOINT
-        absent = np.full((batch.indices.size, len(joints)), np.nan)
-        columns = {
-            name: batch.columns[name][:, found]
-            if len(getattr(message, name)) == len(message.name)
-            else absent
-            for name in ("velocity", "effort")
-        }
-        return {"position": batch.columns["position"][:, found], **columns}
+        velocity = np.full((batch.indices.size, len(joints)), np.nan)
+        if len(message.velocity) == len(message.name):
+            velocity = batch.columns["velocity"][:, found]
+        return {"position": batch.columns["position"][:, found], "velocity": velocity}
 
     return extract
 

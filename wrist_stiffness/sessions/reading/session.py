@@ -44,7 +44,6 @@ from wrist_stiffness.sessions.reading.registration import registered
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_any, last_of_equal
 from wrist_stiffness.sessions.reading.static_frames import KnownFrames, frames_of
 from wrist_stiffness.sessions.reading.stood_still import stood_still
-from wrist_stiffness.topics import MOTOR_COMMANDS
 
 GEOMETRY = "geometry_sha256"
 """Key of the notes: checksum of the geometry file of the wrist that was recorded."""
@@ -133,7 +132,7 @@ def opened(
     """
     recording = open_recording(path)
     joints = settings.motors.motor_1, settings.motors.motor_2
-    samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
+    samples = read_samples(recording, remaps=remaps, joints=joints)
     require_topics(recording, samples, remaps)
     return recording, samples, frames_of(recording, remaps, settings.frames)
 
