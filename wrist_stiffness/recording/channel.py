@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from functools import cache
 from io import BytesIO
 
 from mcap.data_stream import ReadDataStream
@@ -44,19 +43,9 @@ def channel_of(topic: str, message_type: type[Message]) -> Channel:
 
     Gives `Channel`: with the official definition and its hash.
     """
-    return _channel_of(topic, message_type.ros_type)
-
-
-@cache
-def _channel_of(topic: str, ros_type: str) -> Channel:
-    return Channel(
-        topic=topic,
-        ros_type=ros_type,
-        message_encoding="cdr",
-        schema_encoding="ros2msg",
-        schema_text=definition_text(ros_type).encode(),
-        type_hash=type_hash(ros_type),
-    )
+    ros_type = message_type.ros_type
+    text = definition_text(ros_type).encode()
+    return Channel(topic, ros_type, "cdr", "ros2msg", text, type_hash(ros_type))
 
 
 UNREADABLE = (McapError, struct.error, ValueError)
