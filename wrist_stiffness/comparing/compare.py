@@ -30,7 +30,7 @@ from wrist_stiffness.inference.outliers import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import Observed
+from wrist_stiffness.sessions.observing import Observed, side_by_side
 from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
@@ -107,17 +107,11 @@ def _prepared(
             f"{FEWEST_UNITS}{why}"
         )
     used = np.concatenate([each.measured for each in cuts])
-    own = [
-        np.concatenate(
-            [each.columns if each is one else np.zeros_like(each.columns) for each in set_ups]
-        )[used]
-        for one in set_ups
-    ]
-    columns = np.concatenate(own, axis=2)
+    columns = side_by_side([each.columns for each in set_ups])[used]
     z = np.concatenate([each.moved for each in set_ups])
     weights = np.concatenate([each.weights for each in set_ups])[used]
     left = explain(refitted, cuts, columns, z, weights)
-    table = observed.observations
+    table, own = observed.observations, np.split(columns, len(set_ups), axis=2)
     taken = (each.taken_up(table, part) for each, part in zip(set_ups, own, strict=True))
     return observed, left, tuple(chain.from_iterable(taken))
 

@@ -103,17 +103,15 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
         sessions[0].quantities,
         stand=stand,
         shared=counts,
-        common=_common(sessions),
+        common=side_by_side([s.common for s in sessions]) if sessions[0].gauges else None,
     )
     return Observed(sessions, predicted, replace(observations.take(used), row=None))
 
 
-def _common(sessions: Sequence[UnitSession]) -> Array | None:
-    """Return what the mountings of all sessions' gauges do to the units, (u, m, q)."""
-    if sessions[0].gauges is None:
-        return None
-    flat = block_diag(*(each.common.reshape(-1, each.common.shape[2]) for each in sessions))
-    return np.asarray(flat.reshape(-1, sessions[0].values.shape[1], flat.shape[1]))
+def side_by_side(columns: Sequence[Array]) -> Array:
+    """Return what each session's columns do to its own units, as columns of all units (u, m, q)."""
+    flat = block_diag(*(each.reshape(-1, each.shape[2]) for each in columns))
+    return np.asarray(flat.reshape(-1, columns[0].shape[1], flat.shape[1]))
 
 
 def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
@@ -201,12 +199,8 @@ def hidden_counts(table: Table, cut: Cut, theta: Array) -> Array:
 
 def counts_known(cut: Cut, step: float) -> Array:
     """Return how many counts of their own the mean angles of units rest on, (u, 2)."""
-    used = cut.unit >= 0
-    unit, theta = cut.unit[used], cut.block.theta[used]
-    low, high = np.full((2, len(cut.dwell), 2), np.nan)
-    np.fmin.at(low, unit, theta)
-    np.fmax.at(high, unit, theta)
-    moments = np.bincount(unit, minlength=len(low))[:, None]
+    low, high = cut.extremes(cut.block.theta)
+    moments = np.bincount(cut.unit[cut.unit >= 0], minlength=len(low))[:, None]
     return np.clip((high - low) / step, 1.0, np.where(cut.dwell[:, None], 1.0, moments))
 
 
@@ -255,13 +249,8 @@ def _stands(cut: Cut, step: float, longest_s: float) -> Labels:
         moved = bool(late[moment] or (np.abs(theta[moment] - begun) > COUNTS * step).any())
         begun = theta[moment] if moved else begun
         number[moment] = number[moment - 1] + moved
-    used = cut.unit >= 0
-    unit, number = cut.unit[used], number[used]
-    first, last = np.full(len(cut.dwell), len(theta)), np.full(len(cut.dwell), -1)
-    np.minimum.at(first, unit, number)
-    np.maximum.at(last, unit, number)
-    moving = np.zeros(len(cut.dwell), dtype=bool)
+    first, last = cut.extremes(number)
     # A count that flickers at rest is as fast at its moment as a slow motion.
-    fast = (np.abs(cut.mean_speed[used]) > COUNTS * step / WINDOW_S).any(axis=1)
-    np.logical_or.at(moving, unit, fast)
-    return np.where((first == last) & (cut.dwell | ~moving), first, -1)
+    fastest = cut.extremes(np.abs(cut.mean_speed))[1].max(axis=1)
+    still = cut.dwell | (fastest <= COUNTS * step / WINDOW_S)
+    return np.where((first == last) & still, first, -1.0).astype(np.intp)
