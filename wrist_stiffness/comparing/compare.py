@@ -11,12 +11,12 @@ import numpy as np
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
 from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.set_up import without_set_up
-from wrist_stiffness.comparing.too_large import load_too_large
 from wrist_stiffness.comparing.wiring import (
     LOAD_MISTAKES,
     MISTAKES,
     Mistake,
     Suspicion,
+    load_too_large,
     suspected,
     told_mistake,
 )

@@ -81,7 +81,7 @@ class Cut:
         )
 
     def extremes(self, values: Array | Labels) -> tuple[Array, Array]:
-        """Return the least and the largest of values at kept moments (k, ...) in each unit, (u, ...)."""
+        """Return the least and largest in each unit (u, ...) of values at kept moments (k, ...)."""
         used = self.unit >= 0
         least, largest = np.full((2, len(self.dwell), *values.shape[1:]), np.nan)
         np.fmin.at(least, self.unit[used], values[used])
