@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.recording.batch import Batch, decode_batches
+from wrist_stiffness.recording.fixed_layout import Batch, decode_batches
 from wrist_stiffness.recording.mcap_chunk import Payloads
 from wrist_stiffness.recording.messages import (
     JointState,
