@@ -30,7 +30,7 @@ from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
 from wrist_stiffness.sessions.reading.clocks import ClockOffset, ClockStep, clock_offset, clock_step
 from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings, held_to
-from wrist_stiffness.sessions.reading.lost_beams import lost_beams
+from wrist_stiffness.sessions.reading.lost_beams import lost_beams, stood_still
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.sessions.reading.pose_track import MeasuredTrack, pose_track
 from wrist_stiffness.sessions.reading.refusals import (
@@ -43,7 +43,6 @@ from wrist_stiffness.sessions.reading.refusals import (
 from wrist_stiffness.sessions.reading.registration import registered
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_any, last_of_equal
 from wrist_stiffness.sessions.reading.static_frames import KnownFrames, frames_of
-from wrist_stiffness.sessions.reading.stood_still import stood_still
 
 GEOMETRY = "geometry_sha256"
 """Key of the notes: checksum of the geometry file of the wrist that was recorded."""
