@@ -226,7 +226,7 @@ def worst_poses(
 ) -> tuple[WorstPose, ...]:
     """Return the units with the largest errors against the noise, worst first.
 
-    `observations`: residuals with the covariates of `observing.observe`; `noise`: by quantity.
+    `observations`: residuals with the covariates of `observing.tabulate`; `noise`: by quantity.
     """
     errors = {q.key: lengths(observations, q) for q in observations.reported}
     relative = [np.nan_to_num(error) / (noise[key] or np.inf) for key, error in errors.items()]

@@ -14,8 +14,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import cleared
-from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.unit_session import UnitSession, all_units
+from wrist_stiffness.sessions.unit_session import UnitSession
 from wrist_stiffness.sessions.units import COUNTS, SPARSE_S, WINDOW_S, Cut, Labels
 
 WANDER = {"um": 0.5e-6, "mdeg": 5e-6}
@@ -54,31 +53,22 @@ def without_mounting(table: Observations, values: Array) -> Array:
     return cleared(values, table.common, usual_wander(table.quantities))
 
 
-def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
-    """Compare a model with sessions in the order of time, unit by unit.
-
-    Only units in the table's domain and load range count.  Raises `InputError` if there is no
-    session, nothing of one lies in the model's range, or no unit was measured.
-    """
-    if not sessions:
-        raise InputError("no session to compare the model with")
-    cuts = all_units(model, sessions)
-    predicted = np.concatenate([predict_units(model, each) for each in cuts])
-    return tabulate(model, cuts, predicted)
-
-
 def predict_units(model: ErrorModel, session: UnitSession) -> Array:
     """Return the predicted pose error of each unit as the sensor says it, (u, 6) [m, rad]."""
     return session.mean_twist(model.batch(session.block).measured)
 
 
-def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array) -> Observed:
+def tabulate(
+    model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array | None = None
+) -> Observed:
     """Return the table of residuals of units against a prediction of them.
 
     `model`: its kinematics and encoder step tell what the encoders hide; `sessions`: in the order
     of time, u units together; `predicted` (u, 6): pose error of the units, as the sensor would say
-    it [m, rad].  Raises `InputError` if no unit was measured.
+    it, by default the model's [m, rad].  Raises `InputError` if no unit was measured.
     """
+    if predicted is None:
+        predicted = np.concatenate([predict_units(model, each) for each in sessions])
     parts = np.split(predicted, np.cumsum([len(each) for each in sessions])[:-1])
     values = np.concatenate(
         [each.residual(part) for each, part in zip(sessions, parts, strict=True)]
