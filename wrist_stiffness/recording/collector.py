@@ -202,30 +202,28 @@ class Collector:
     def faults(self) -> list[Fault]:
         """Return what was wrong, one entry for each kind."""
         rows = self.rows()
-        found = {kind: np.array(times) for kind, times in self.counts.items() if kind != IGNORED}
+        found = defaultdict(list, {kind: [*own] for kind, own in self.counts.items()})
+        found.pop(IGNORED, None)
         if rows:
             log_times = rows["log_time_ns"]
             for name in self.finite:
                 values = rows[name].reshape(log_times.size, -1)
-                found[f"{name} not finite"] = log_times[~np.isfinite(values).all(axis=1)]
-        if rows and self.message_type is not String:
-            # One temperature topic serves several components, each with stamps of its own.
-            groups = np.unique(rows["frame_id"]) if self.message_type is Temperature else [None]
-            steps = [self._steps(rows, group) for group in groups]
-            found["stamp repeated"] = np.concatenate([later[step == 0] for later, step in steps])
-            found["stamp running backwards"] = np.concatenate(
-                [later[step < 0] for later, step in steps]
-            )
+                found[f"{name} not finite"] += log_times[~np.isfinite(values).all(axis=1)].tolist()
+            for own in self._of_one_clock(rows):
+                step, later = np.diff(rows["time_ns"][own]), log_times[own][1:]
+                found["stamp repeated"] += later[step == 0].tolist()
+                found["stamp running backwards"] += later[step < 0].tolist()
         return [
-            Fault(self.topic, kind, int(times.size), int(times.min()))
+            Fault(self.topic, kind, len(times), min(times))
             for kind, times in found.items()
-            if times.size
+            if times
         ]
 
-    @staticmethod
-    def _steps(rows: Rows, group: str | None) -> tuple[TimeArray, TimeArray]:
-        chosen = slice(None) if group is None else rows["frame_id"] == group
-        return rows["log_time_ns"][chosen][1:], np.diff(rows["time_ns"][chosen])
+    def _of_one_clock(self, rows: Rows) -> list[Any]:
+        """Return which rows have stamps that must rise."""
+        if self.message_type is Temperature:  # one topic serves several components
+            return [rows["frame_id"] == name for name in np.unique(rows["frame_id"])]
+        return [] if self.message_type is String else [slice(None)]
 
     def _count(self, kind: str, times: TimeArray) -> None:
         if times.size:
