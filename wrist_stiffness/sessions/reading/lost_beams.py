@@ -11,7 +11,7 @@ from wrist_stiffness.inference.outliers import MAD_TO_SIGMA
 from wrist_stiffness.mechanism.components import MOTORS, Array
 from wrist_stiffness.mechanism.rigid_motion import rotation_vector
 from wrist_stiffness.sessions.in_pieces import in_pieces
-from wrist_stiffness.sessions.reading.registration import place_left, places_of, turn_left
+from wrist_stiffness.sessions.reading.registration import place_left, turn_left
 from wrist_stiffness.sessions.unit_session import FINEST
 
 Mask = NDArray[np.bool_]
@@ -85,9 +85,9 @@ def lost_beams(time: Array, shift: Array, rotation: Array, rigid: Array, step: f
     swing = _swing(time, way)
     moving = swing > MOVING_RAD
     turn = turn_left(rotation, rigid)
-    place, lever = place_left(shift, rigid)
+    place, target = place_left(shift, rigid)
     # Stamps that jitter hide much along the motion and nothing across it.
-    lost = spikes(place, LEAST_SPIKE_M, lever * swing, moving)
+    lost = spikes(place, LEAST_SPIKE_M, np.linalg.norm(target) * swing, moving)
     for each in (turn, _across(turn, way, step)):
         lost |= spikes(each, LEAST_SPIKE_STEPS * step, swing, moving)
     return lost
@@ -193,8 +193,8 @@ def _moved(time: Array, shift: Array, rotation: Array, rigid: Array, repeats: Ma
         left, lever = turn_left(rotation[first], rigid[first]), 1.0
         way = rotation_vector(now @ np.swapaxes(start, 1, 2))
     else:
-        left, lever = place_left(shift[first], rigid[first])
-        way = (now - start) @ places_of(shift[first], rigid[first])[0]
+        left, target = place_left(shift[first], rigid[first])
+        way, lever = (now - start) @ target, float(np.linalg.norm(target))
     left = np.nan_to_num(left[np.isfinite(left).any(axis=1)])
     usual = float(np.quantile(np.linalg.norm(left, axis=1), MOVING_SHARE))
     limit = lever * len(MOTORS) * LOST_MOTION_RAD + MOVING_LIMIT * usual
