@@ -183,9 +183,4 @@ def repeatability(observations: Observations) -> dict[str, float]:
     variance, freedom = replicate_variance(values, np.empty((*values.shape, 0)), observations)
     if freedom < FEWEST_REPEATS:
         return {}
-    # Of a component that was never measured the variance is called 1, which is a metre.
-    variance = np.where(observations.measured.any(axis=0), variance, 0.0)
-    return {
-        q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
-        for q in observations.reported
-    }
+    return observations.rms(np.broadcast_to(variance, values.shape))
