@@ -34,8 +34,6 @@ from wrist_stiffness.sessions.observing import Observed, side_by_side
 from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
-Prepared = tuple[Observed, Explained, tuple[TakenUp, ...]]
-
 VERY_STRONG = 5.0
 """Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
 """
@@ -95,7 +93,7 @@ def _prepared(
     sessions: Sequence[MeasuredSession],
     cuts: tuple[UnitSession, ...],
     calibrated: Sequence[str],
-) -> Prepared:
+) -> tuple[Observed, Explained, tuple[TakenUp, ...]]:
     """Return what a model leaves, what the set-up leaves of that, and where this stands."""
     observed, refitted, set_ups = without_set_up(model, cuts, calibrated)
     if refitted.n_units < FEWEST_UNITS:

@@ -190,13 +190,11 @@ class Collector:
         """Return all rows in the order of reception, an empty dict without any."""
         if not self.blocks:
             return {}
-        if len(self.blocks) > 1:
-            self.blocks = [_joined(self.blocks)]
-        rows = self.blocks[0]
+        rows = _joined(self.blocks)
         if np.any(np.diff(rows["log_time_ns"]) < 0):
             received = np.argsort(rows["log_time_ns"], kind="stable")
             rows = {key: value[received] for key, value in rows.items()}
-            self.blocks = [rows]
+        self.blocks = [rows]
         return rows
 
     def faults(self) -> list[Fault]:
@@ -231,4 +229,6 @@ class Collector:
 
 
 def _joined(parts: list[Rows]) -> Rows:
+    if len(parts) == 1:
+        return parts[0]
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}

@@ -164,15 +164,8 @@ def read_samples(
         collector = collectors.get(remaps.get(standard, standard))
         return collector.rows() if collector else {}
 
-    def group(standard: str) -> dict[str, Rows]:
-        rows = of(standard)
-        found = rows.get("frame_id", np.empty(0, np.str_))
-        return {
-            str(name): {key: column[found == name] for key, column in rows.items()}
-            for name in np.unique(found)
-        }
-
-    covariates = _covariates(recording, remaps)
+    covariates, warmth = _covariates(recording, remaps), of(names.TEMPERATURES)
+    component = warmth.get("frame_id", np.empty(0, np.str_))
     stated = collectors.get(remaps.get(names.JOINT_STATES, names.JOINT_STATES))
     if stated and stated.counts and not stated.rows():
         raise RecordingError(
@@ -187,8 +180,12 @@ def read_samples(
         markers=_made(MarkerSamples, of(names.PLATFORM_MARKERS), position=(0, 3)),
         gauges=_made(GaugeSamples, of(names.GAUGE_READINGS), value=(0,), names=(0,)),
         temperatures={
-            component: _made(ScalarSamples, rows, value=())
-            for component, rows in group(names.TEMPERATURES).items()
+            str(name): _made(
+                ScalarSamples,
+                {key: column[component == name] for key, column in warmth.items()},
+                value=(),
+            )
+            for name in np.unique(component)
         },
         covariates={
             name: _made(ScalarSamples, collectors[topic].rows(), value=())
