@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
 
 from mcap.data_stream import ReadDataStream
@@ -43,7 +44,11 @@ def channel_of(topic: str, message_type: type[Message]) -> Channel:
 
     Gives `Channel`: with the official definition and its hash.
     """
-    ros_type = message_type.ros_type
+    return _channel_of(topic, message_type.ros_type)
+
+
+@cache
+def _channel_of(topic: str, ros_type: str) -> Channel:
     text = definition_text(ros_type).encode()
     return Channel(topic, ros_type, "cdr", "ros2msg", text, type_hash(ros_type))
 
