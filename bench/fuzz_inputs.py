@@ -39,9 +39,8 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.planning.rivals import read_rivals
 from wrist_stiffness.recording import open_recording, read_samples
-from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.cdr import decode, encode
-from wrist_stiffness.recording.fixed_layout import FixedReader
+from wrist_stiffness.recording.fixed_layout import FixedReader, decode_batches
 from wrist_stiffness.recording.messages import MESSAGE_TYPES
 from wrist_stiffness.sessions.gauges import read_gauges
 

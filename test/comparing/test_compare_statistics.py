@@ -8,7 +8,7 @@ from scipy.stats import rankdata
 
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, worst_poses
-from wrist_stiffness.comparing.curve import ranks
+from wrist_stiffness.comparing.curve import CLASSES, classes_of
 from wrist_stiffness.comparing.explained import explain
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.comparing.set_up import without_set_up
@@ -307,7 +307,8 @@ def test_worst_poses_are_apart_and_in_order(dwells):
     assert len(worst_poses(once, floor, ("day",), most=3)) == 1
 
 
-@pytest.mark.parametrize("levels", [1, 4, 1000])
-def test_ranks_are_those_of_scipy_also_of_ties(levels):
+@pytest.mark.parametrize("levels", [20, 40, 1000])
+def test_classes_are_cut_by_the_ranks_of_scipy_also_of_ties(levels):
     values = np.random.default_rng(levels).integers(levels, size=200).astype(float)
-    np.testing.assert_array_equal(ranks(values), rankdata(values))
+    cut = np.floor((rankdata(values) - 0.5) * CLASSES / len(values))
+    np.testing.assert_array_equal(classes_of(values), np.unique(cut, return_inverse=True)[1])

@@ -48,4 +48,4 @@ def test_one_gauge_repeats_as_well_as_that_gauge(dwells):
 def test_uncertainty_of_an_error_is_its_scatter_over_repetitions(dwells):
     draws = [sizes(dwells(rng))["s_um"] for rng in np.random.default_rng(12).spawn(60)]
     scatter = np.std([each.rms for each in draws], ddof=1)
-    assert np.mean([each.uncertainty for each in draws]) == pytest.approx(scatter, rel=0.3)
+    assert np.mean([each.rms_uncertainty for each in draws]) == pytest.approx(scatter, rel=0.3)

@@ -9,7 +9,7 @@ import pytest
 from wrist_stiffness.commands import diagnose
 from wrist_stiffness.commands.diagnose import mistake_beside
 from wrist_stiffness.comparing.compare import compare_models
-from wrist_stiffness.comparing.too_large import load_too_large
+from wrist_stiffness.comparing.wiring import load_too_large
 from wrist_stiffness.simulation.cell import CellSettings
 
 GRAMS = 1e3 / 9.80665

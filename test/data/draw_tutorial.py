@@ -51,7 +51,7 @@ def draw(name: str, folder: Path) -> None:
             f"{q.name} [{typeset(q.unit)}]",
             models,
             [model.after[q.key].rms for model in found.models],
-            [model.after[q.key].uncertainty for model in found.models],
+            [model.after[q.key].rms_uncertainty for model in found.models],
             {"instrument noise": found.noise[q.key]},
         )
         for q in found.quantities

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
 from wrist_stiffness.errors import RecordingError
-from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.cdr import decode, encode
-from wrist_stiffness.recording.fixed_layout import FixedLayout, FixedReader
+from wrist_stiffness.recording.fixed_layout import FixedLayout, FixedReader, decode_batches
 from wrist_stiffness.recording.messages import (
     MESSAGE_TYPES,
     DiagnosticArray,

@@ -55,7 +55,6 @@ def test_joints_are_found_by_name_in_any_order(tmp_path):
     samples = samples_of(tmp_path, entries)
     np.testing.assert_array_equal(samples.joints.position, [[0.1, 0.2], [0.3, 0.4]])
     np.testing.assert_array_equal(samples.joints.velocity, [[3.0, 4.0], [NAN, NAN]])
-    np.testing.assert_array_equal(samples.joints.effort, np.full((2, 2), NAN))
     np.testing.assert_array_equal(samples.joints.time_ns, [1, 2])
     np.testing.assert_array_equal(samples.joints.log_time_ns, [10, 20])
     assert samples.joints.time_ns.dtype == np.int64
@@ -101,17 +100,6 @@ def test_rows_come_in_the_order_of_reception_whatever_that_of_the_file(tmp_path)
     assert samples.joints.time_ns.tolist() == [2, 4, 3, 5, 1]
 
 
-def test_topics_that_are_not_needed_stay_unread(tmp_path):
-    entries = [
-        ("/joint_states", 1, joint_state(1, (0.1, 0.2))),
-        ("/commands", 1, joint_state(1, (0.1, 0.2))),
-    ]
-    remaps = {"/motor_commands": "/commands"}
-    samples = samples_of(tmp_path, entries, remaps=remaps, without=("/motor_commands",))
-    assert len(samples.joints.time_ns) == 1
-    assert len(samples.commands.time_ns) == 0
-
-
 def test_names_of_joints_and_topics_can_be_given(tmp_path):
     entries = [("/robot/js", 1, joint_state(1, (1.0, 2.0), ("b", "a")))]
     samples = samples_of(
@@ -139,7 +127,6 @@ def test_every_kind_of_topic(tmp_path):
         ("/temperatures", 15, Temperature(Header(7, "joint_3"), 30.0)),
         ("/temperatures", 16, Temperature(Header(8, "link_1"), 22.0)),
         ("/covariates/humidity", 17, Float64(0.4)),
-        ("/motor_commands", 18, joint_state(7, (0.1, 0.2))),
         ("/recording_notes", 9, String('{"wrist": "a"}')),
         ("/recording_notes", 19, String('{"operator": "é"}')),
     ]
@@ -157,7 +144,6 @@ def test_every_kind_of_topic(tmp_path):
     np.testing.assert_array_equal(samples.temperatures["link_1"].time_ns, [7, 8])
     np.testing.assert_array_equal(samples.covariates["humidity"].value, [0.4])
     np.testing.assert_array_equal(samples.covariates["humidity"].time_ns, [17])
-    np.testing.assert_array_equal(samples.commands.position, [[0.1, 0.2]])
     assert samples.notes == ('{"wrist": "a"}', '{"operator": "é"}')
     # A lost marker and two components with one stamp are no faults.
     assert samples.faults == ()

@@ -3,7 +3,7 @@
 import pytest
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.recording import parse_topic_remaps
+from wrist_stiffness.topics import parse_topic_remaps
 
 
 def test_remaps_are_parsed():

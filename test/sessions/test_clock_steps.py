@@ -88,7 +88,7 @@ def test_a_delay_that_changes_a_little_is_no_clock(tmp_path, long, table, second
 
 def test_one_offset_that_fits_is_no_step(long):
     own = np.arange(0, 18 * SECOND, 10 * MILLISECOND) + long.joint_ns[0]
-    rigid = Signal(own, Rotation.from_matrix(long.rigid(own)).as_quat())
+    rigid = Signal(own, long.rigid(own))
     seen = own[100:-100]
     assert clock_step(seen, long.rigid(seen - 120 * MILLISECOND), rigid, 4.0) is None
     late = np.where(seen < own[800], 0, 500 * MILLISECOND)

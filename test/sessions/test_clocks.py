@@ -20,7 +20,7 @@ def turned(t):
 def test_stated_uncertainty_is_the_scatter_over_repetitions():
     rng = np.random.default_rng(12)
     own = np.arange(0.0, 40.0, 0.04)
-    rigid = Signal((own * NANOSECONDS).astype(np.int64), turned(own).as_quat())
+    rigid = Signal((own * NANOSECONDS).astype(np.int64), turned(own).as_matrix())
     seen = np.arange(1.0, 39.0, 0.1)
     stamps = ((seen + 0.1) * NANOSECONDS).astype(np.int64)
     found = []

@@ -8,9 +8,9 @@ import pytest
 
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.identification.calibration import calibrate
-from wrist_stiffness.sessions.observing import observe
+from wrist_stiffness.sessions.observing import tabulate
 from wrist_stiffness.sessions.reading.session import read_session
-from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.sessions.unit_session import all_units, as_units
 
 THURSDAY = Path(__file__).parent.parent / "data" / "tutorial" / "thursday.mcap"
 
@@ -50,7 +50,7 @@ def test_units_of_an_instrument_without_scatter_can_be_weighed(model, session):
     shift = session.shift.copy()
     for unit in np.flatnonzero(still.dwell):
         shift[still.label == unit] = shift[still.label == unit][0]
-    observed = observe(model, [replace(session, shift=shift)])
+    observed = tabulate(model, all_units(model, [replace(session, shift=shift)]))
     np.linalg.cholesky(observed.observations.covariance)
 
 

@@ -20,8 +20,9 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.gauges import Gauge, Gauges
-from wrist_stiffness.sessions.observing import observe, without_mounting
+from wrist_stiffness.sessions.observing import tabulate, without_mounting
 from wrist_stiffness.sessions.reading.session import read_session
+from wrist_stiffness.sessions.unit_session import all_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.web.bench import Bench
@@ -110,7 +111,7 @@ def test_a_gauge_is_the_projected_pose_of_a_tracker(tmp_path, model, table):
     """What is left of readings is what is left of poses along each gauge, but for its mounting."""
     block = conditions()
     session = read_session(imported(tmp_path, block, readings_of(model, block)), table)
-    seen = observe(model, [session])
+    seen = tabulate(model, all_units(model, [session]))
     left = without_mounting(seen.observations, seen.observations.values)
     assert left.shape == (len(block), len(GAUGES))
     # Digits of the table beside the noise; mountings take up six numbers of each gauge.
@@ -132,7 +133,7 @@ def test_in_motion_readings_are_means_of_what_is_read_along_the_way(tmp_path, mo
     session = read_session(
         imported(tmp_path, block, readings_of(true, block, off, noise=0.0)), table
     )
-    seen = observe(true, [session]).observations
+    seen = tabulate(true, all_units(true, [session])).observations
     left = without_mounting(seen, seen.values)
     digits = 0.01 / np.sqrt(12.0) / PER_SI
     assert np.all(left.std(axis=0) < 3.0 * digits)
@@ -152,7 +153,7 @@ def test_a_mounting_off_by_millimetres_and_degrees_is_found_and_said(tmp_path, m
     path = imported(tmp_path, block, readings_of(model, block, true))
     session = read_session(path, table)
     assert any("mm from its point" in remark for remark in session.remarks)
-    seen = observe(model, [session])
+    seen = tabulate(model, all_units(model, [session]))
     left = without_mounting(seen.observations, seen.observations.values)
     assert np.all(left.std(axis=0) < 1.3 * np.hypot(NOISE, 0.01 / np.sqrt(12.0) / PER_SI))
 
@@ -218,7 +219,7 @@ def test_readings_one_after_the_other_tell_the_same(tmp_path, model, table):
     session = read_session(imported(tmp_path, block, readings), table)
     assert np.all(session.measured.sum(axis=1) <= 1)
     assert session.measured.sum() == len(block)
-    seen = observe(model, [session]).observations
+    seen = tabulate(model, all_units(model, [session])).observations
     left = without_mounting(seen, seen.values)
     assert np.nanstd(left[:, 0]) < 2.0 * NOISE[0]
 

@@ -11,12 +11,16 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.columns import SessionModel
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import counts_known, observe, predict_units
-from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.sessions.observing import counts_known, predict_units, tabulate
+from wrist_stiffness.sessions.unit_session import all_units, as_units
 
 POSES_DEG = ((0, 0), (20, 10), (-15, 25), (20, 10))
 ADDED = np.array([3e-6, -2e-6, 5e-6, 2e-4, -1e-4, 3e-4])
 """Twist by which the platform is measured off its prediction [m, rad]."""
+
+
+def observe(model, sessions):
+    return tabulate(model, all_units(model, sessions))
 
 
 @pytest.fixture

@@ -114,9 +114,9 @@ def test_wild_positions_have_no_say_in_where_the_target_is(table):
     wild = np.arange(0, 600, 10)
     shift[wild] += rigid[wild] @ [0.03, 0.0, 0.02]
     shift[5::10] = np.nan
-    left, lever = place_left(shift, rigid)
+    left, found = place_left(shift, rigid)
     sound = np.setdiff1d(np.arange(600), [*wild, *range(5, 600, 10)])
-    assert lever == pytest.approx(np.linalg.norm(target), rel=1e-3)
+    assert np.linalg.norm(found) == pytest.approx(np.linalg.norm(target), rel=1e-3)
     np.testing.assert_allclose(left[sound], noise[sound], atol=1e-6)
     assert np.isnan(left[5::10]).all()
 

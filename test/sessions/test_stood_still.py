@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.sessions.in_pieces import rigid_rotation
+from wrist_stiffness.sessions.reading.lost_beams import stood_still
 from wrist_stiffness.sessions.reading.session import read_session
-from wrist_stiffness.sessions.reading.stood_still import stood_still
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 

@@ -5,9 +5,10 @@ import numpy as np
 from wrist_stiffness.commands.export_csv import export_csv
 from wrist_stiffness.commands.import_csv import import_csv
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.sessions.observing import observe
+from wrist_stiffness.sessions.observing import tabulate
 from wrist_stiffness.sessions.reading.session import read_session, turning_stamps
 from wrist_stiffness.sessions.reading.signals import Signal
+from wrist_stiffness.sessions.unit_session import all_units
 from wrist_stiffness.shipped import shipped_file
 
 SECOND = 1_000_000_000
@@ -62,7 +63,7 @@ def test_each_pose_measured_at_rest_is_a_unit_and_knows_its_approach(tmp_path, c
     campaign.with_joints().with_loads(force=lambda i: (0.0, 0.0, -1.0)).with_poses(stamps=stamps)
     path = campaign.written(tmp_path / "bag")
     model = load_model(shipped_file("config/palmieri2015_model.yaml"))
-    observed = observe(model, [read_session(path, table)]).observations
+    observed = tabulate(model, all_units(model, [read_session(path, table)])).observations
     assert len(observed.values) == 8
     np.testing.assert_array_equal(observed.covariates["approach_1"], [1, -1] * 4)
 
@@ -70,7 +71,9 @@ def test_each_pose_measured_at_rest_is_a_unit_and_knows_its_approach(tmp_path, c
     exported = export_csv(path, tmp_path / "poses.csv", table)
     assert (exported.rows, exported.turns > 0) == (8, True)
     import_csv(tmp_path / "poses.csv", tmp_path / "again")
-    again = observe(model, [read_session(tmp_path / "again", table)]).observations
+    again = tabulate(
+        model, all_units(model, [read_session(tmp_path / "again", table)])
+    ).observations
     np.testing.assert_array_equal(again.covariates["approach_1"], [1, -1] * 4)
     export_csv(tmp_path / "again", tmp_path / "twice.csv", table)
     assert (tmp_path / "twice.csv").read_bytes() == (tmp_path / "poses.csv").read_bytes()

@@ -11,8 +11,7 @@ from wrist_stiffness.atomic_file import require_room
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings, read_sessions, was_fitted_to
 from wrist_stiffness.comparing.compare import doubts_load, suspicion_in, wrong_load
-from wrist_stiffness.comparing.too_large import load_too_large
-from wrist_stiffness.comparing.wiring import told_mistake
+from wrist_stiffness.comparing.wiring import load_too_large, told_mistake
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import Calibration, calibrate
 from wrist_stiffness.identification.free_effects import unfitted

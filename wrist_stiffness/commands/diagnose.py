@@ -19,8 +19,7 @@ from wrist_stiffness.commands.read_sessions import (
 )
 from wrist_stiffness.comparing.compare import suspicion_in, wrong_load
 from wrist_stiffness.comparing.explained import Explained, explain
-from wrist_stiffness.comparing.too_large import load_too_large
-from wrist_stiffness.comparing.wiring import WORTH_ASKING, told_mistake
+from wrist_stiffness.comparing.wiring import WORTH_ASKING, load_too_large, told_mistake
 from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions

@@ -29,11 +29,10 @@ from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.rigid_motion import pose_of_twist
 from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.recording import messages as msg
-from wrist_stiffness.recording.batch import decode_batches
 from wrist_stiffness.recording.cdr import decode, encode
 from wrist_stiffness.recording.channel import channel_of
 from wrist_stiffness.recording.chunk_writer import Messages
-from wrist_stiffness.recording.fixed_layout import FixedLayout
+from wrist_stiffness.recording.fixed_layout import FixedLayout, decode_batches
 from wrist_stiffness.recording.raw_block import Integers, RawBlock, RawMessage
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.topics import BASE_FRAME, CORRECTED_FRAME, MICROMETRES, MILLIDEGREES

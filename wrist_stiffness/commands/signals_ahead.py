@@ -12,7 +12,7 @@ from wrist_stiffness.compensation.intake import transform_of
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.recording import messages as msg
-from wrist_stiffness.recording.batch import Batch, decode_batches
+from wrist_stiffness.recording.fixed_layout import Batch, decode_batches
 from wrist_stiffness.recording.raw_block import RawBlock
 from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.topics import COVARIATES

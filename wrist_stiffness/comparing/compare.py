@@ -11,12 +11,12 @@ import numpy as np
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison
 from wrist_stiffness.comparing.explained import Explained, explain
 from wrist_stiffness.comparing.set_up import without_set_up
-from wrist_stiffness.comparing.too_large import load_too_large
 from wrist_stiffness.comparing.wiring import (
     LOAD_MISTAKES,
     MISTAKES,
     Mistake,
     Suspicion,
+    load_too_large,
     suspected,
     told_mistake,
 )
@@ -30,11 +30,9 @@ from wrist_stiffness.inference.outliers import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.observing import Observed
+from wrist_stiffness.sessions.observing import Observed, side_by_side
 from wrist_stiffness.sessions.refitted import ANSWERS_LOAD
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
-
-Prepared = tuple[Observed, Explained, tuple[TakenUp, ...]]
 
 VERY_STRONG = 5.0
 """Gain of log evidence from which a load is told to be wrong (Kass and Raftery 1995, section 3.2).
@@ -95,7 +93,7 @@ def _prepared(
     sessions: Sequence[MeasuredSession],
     cuts: tuple[UnitSession, ...],
     calibrated: Sequence[str],
-) -> Prepared:
+) -> tuple[Observed, Explained, tuple[TakenUp, ...]]:
     """Return what a model leaves, what the set-up leaves of that, and where this stands."""
     observed, refitted, set_ups = without_set_up(model, cuts, calibrated)
     if refitted.n_units < FEWEST_UNITS:
@@ -107,17 +105,11 @@ def _prepared(
             f"{FEWEST_UNITS}{why}"
         )
     used = np.concatenate([each.measured for each in cuts])
-    own = [
-        np.concatenate(
-            [each.columns if each is one else np.zeros_like(each.columns) for each in set_ups]
-        )[used]
-        for one in set_ups
-    ]
-    columns = np.concatenate(own, axis=2)
+    columns = side_by_side([each.columns for each in set_ups])[used]
     z = np.concatenate([each.moved for each in set_ups])
     weights = np.concatenate([each.weights for each in set_ups])[used]
     left = explain(refitted, cuts, columns, z, weights)
-    table = observed.observations
+    table, own = observed.observations, np.split(columns, len(set_ups), axis=2)
     taken = (each.taken_up(table, part) for each, part in zip(set_ups, own, strict=True))
     return observed, left, tuple(chain.from_iterable(taken))
 
@@ -189,9 +181,4 @@ def repeatability(observations: Observations) -> dict[str, float]:
     variance, freedom = replicate_variance(values, np.empty((*values.shape, 0)), observations)
     if freedom < FEWEST_REPEATS:
         return {}
-    # Of a component that was never measured the variance is called 1, which is a metre.
-    variance = np.where(observations.measured.any(axis=0), variance, 0.0)
-    return {
-        q.key: float(np.sqrt(variance[list(q.components)].sum())) * q.per_si
-        for q in observations.reported
-    }
+    return observations.rms(np.broadcast_to(variance, values.shape))

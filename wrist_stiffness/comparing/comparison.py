@@ -30,22 +30,13 @@ SAME_DEG, SAME_N = 2.0, 0.1
 
 @dataclass(frozen=True)
 class Size:
-    """Error of one quantity over all units, in the unit of its report."""
+    """Error of one quantity over all units, in the unit of its report, as programs read it."""
 
-    # `mean`, `rms`, `maximum`: of the vector's length
+    # `mean`, `rms`, `max`: of the vector's length
     mean: float
     rms: float
-    maximum: float
-    uncertainty: float  # one standard uncertainty of `rms`
-
-    def as_values(self) -> dict[str, float]:
-        """Return what programs read."""
-        return {
-            "mean": self.mean,
-            "rms": self.rms,
-            "rms_uncertainty": self.uncertainty,
-            "max": self.maximum,
-        }
+    rms_uncertainty: float  # one standard uncertainty
+    max: float
 
 
 def lengths(observations: Observations, quantity: Quantity) -> Array:
@@ -69,7 +60,7 @@ def _size(observations: Observations, length: Array) -> Size:
     rms = float(np.sqrt(np.mean(length**2)))
     scatter = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
     slope = 1.0 / (2.0 * rms) if rms > 0.0 else 0.0
-    return Size(float(length.mean()), rms, float(length.max()), float(scatter * slope))
+    return Size(float(length.mean()), rms, float(scatter * slope), float(length.max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +125,7 @@ class Comparison:
         """
         before = self.models[0].after[key]
         possible = before.rms - self.reachable[key]
-        if possible <= 2.0 * before.uncertainty:
+        if possible <= 2.0 * before.rms_uncertainty:
             return None
         return (before.rms - model.after[key].rms) / possible
 
@@ -201,8 +192,8 @@ class Comparison:
     def _model_values(self, model: ComparedModel) -> dict[str, Any]:
         return {
             "model": model.name,
-            "before_registration": {k: size.as_values() for k, size in model.before.items()},
-            "after_registration": {k: size.as_values() for k, size in model.after.items()},
+            "before_registration": {k: vars(size) for k, size in model.before.items()},
+            "after_registration": {k: vars(size) for k, size in model.after.items()},
             "absorbed": [each.sentence for each in model.absorbed],
             "explained_headroom": {q.key: self.headroom(model, q.key) for q in self.quantities},
             **as_values(model.explained),
@@ -235,7 +226,7 @@ def worst_poses(
 ) -> tuple[WorstPose, ...]:
     """Return the units with the largest errors against the noise, worst first.
 
-    `observations`: residuals with the covariates of `observing.observe`; `noise`: by quantity.
+    `observations`: residuals with the covariates of `observing.tabulate`; `noise`: by quantity.
     """
     errors = {q.key: lengths(observations, q) for q in observations.reported}
     relative = [np.nan_to_num(error) / (noise[key] or np.inf) for key, error in errors.items()]

@@ -211,23 +211,14 @@ def condition_label(name: str) -> str:
 
 def classes_of(values: Array, most: int = CLASSES) -> Labels:
     """Return classes of about equal numbers of units; what is equal is in one class."""
-    rounded = np.round(values, 9)
-    if len(np.unique(rounded)) <= most:
-        labels = np.unique(rounded, return_inverse=True)[1]
-    else:
-        labels = np.floor((ranks(rounded) - 0.5) * most / len(values))
-    return np.unique(labels, return_inverse=True)[1]
+    _, place, count = np.unique(np.round(values, 9), return_inverse=True, return_counts=True)
+    if len(count) <= most:
+        return place
+    below = np.cumsum(count) - 0.5 * count
+    labels = np.floor(below * most / len(values))
+    return np.unique(labels, return_inverse=True)[1][place]
 
 
 def _cells(values: Array) -> Labels:
     """Return the cell of a map of each pair of angles [deg]."""
     return np.unique(np.floor(values / CELL_DEG), axis=0, return_inverse=True)[1].reshape(-1)
-
-
-def ranks(values: Array) -> Array:
-    """Return the rank of each value (n,) from 1 on, ties at their mean rank.
-
-    That of scipy.stats, whose import costs a command a second.
-    """
-    _, place, counts = np.unique(values, return_inverse=True, return_counts=True)
-    return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1.0))[place])

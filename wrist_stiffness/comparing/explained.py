@@ -69,7 +69,7 @@ class Explained:
     """What is left of the units, and what the evidence says of it."""
 
     # values are what is left after set-up (and whatever else was fitted); conditions as
-    # `observing.observe` names them
+    # `observing.tabulate` names them
     observations: Observations
     table: WristTable  # of the same units
     point: Point  # the same, whitened, with the slopes of what was fitted

@@ -23,7 +23,7 @@ from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.parameters import si_factor
 from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.sessions.gauges import cleared
-from wrist_stiffness.sessions.observing import Observed, predict_units, tabulate, usual_wander
+from wrist_stiffness.sessions.observing import Observed, tabulate, usual_wander
 from wrist_stiffness.sessions.refitted import REGISTRATIONS, SET_UP, names_of
 from wrist_stiffness.sessions.unit_session import UnitSession
 
@@ -112,8 +112,6 @@ def without_set_up(
     were calibrated: they stay; `predicted` (u, 6): what the model predicts of all units, where that
     is known already [m, rad].
     """
-    if predicted is None:
-        predicted = np.concatenate([predict_units(model, each) for each in sessions])
     observed = tabulate(model, sessions, predicted)
     free = np.ones(len(PLAUSIBLE), dtype=bool)
     gauges = sessions[0].gauges is not None

@@ -12,18 +12,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.comparing.set_up import INDEPENDENT, without_set_up
+from wrist_stiffness.identification.calibration import said_calibrated
 from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import Gauge
-from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.sessions.measured_session import MOST_BEYOND, MeasuredSession, overloaded
 from wrist_stiffness.sessions.observing import Observed
-from wrist_stiffness.sessions.unit_session import UnitSession
+from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 LOOK_FIRST = "Look at the set-up first"
 """How the sentence begins that tells a mistake."""
@@ -34,6 +36,9 @@ WORTH_ASKING = 2.0
 BESIDE = (0.5, 2.0)
 """A unit is none if so many times its load fits better: then the wrist has another stiffness, as a
 fault may give it.  The units that are taken for each other are more than four times apart."""
+
+APART = 4.0
+"""No wrist is so many times as soft as its model, and units are farther apart."""
 
 RIGHT = 0.5
 """Probability, before anything is measured, that nothing is wrong: as good as any other."""
@@ -289,5 +294,62 @@ def _without(
     same = all(a.block is b.block for a, b in zip(right, observed.sessions, strict=True))
     predicted = observed.predicted if same else None
     _, refitted, _ = without_set_up(model, right, calibrated, predicted)
-    left = refitted.rms(np.nan_to_num(refitted.values) ** 2)
-    return {key: size / mistake.unit(key) for key, size in left.items()}
+    return {key: size / mistake.unit(key) for key, size in _error(refitted).items()}
+
+
+def _error(left: Observations) -> dict[str, float]:
+    """Return the RMS of what is left, by the key of the quantity."""
+    return left.rms(np.nan_to_num(left.values) ** 2)
+
+
+def load_too_large(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> str:
+    """Return a sentence on a load that is mostly beyond a model's range; empty where it is not.
+
+    Such samples are left out before anything is compared, and what stays are the moments without a
+    load: so the units are tried on all that was measured.
+
+    It names the unit under which the load is in the range and explains what was measured.  Where
+    there is none, it says only where to look.
+
+    `sessions`: of one wrist, in the order of time.  Raises `InputError` if none of their
+    measurements lies in the model's domain.
+    """
+
+    def beyond(mistake: Mistake | None = None) -> NDArray[np.bool_]:
+        """Tell which measurements have a larger force or moment than the table takes, (n, 2)."""
+        blocks = (each.take(np.asarray(each.measured.any(axis=1))).block for each in sessions)
+        right = blocks if mistake is None else map(mistake.block, blocks)
+        none = np.empty((0, 2), dtype=bool)
+        return np.concatenate([none, *(overloaded(model.table, block) for block in right)])
+
+    def left(mistake: Mistake) -> Observations:
+        """Return what the model and the set-up leave of the units without a mistake."""
+        right = tuple(mistake.measured_right(each) for each in sessions)
+        return without_set_up(model, all_units(model, right), said_calibrated(sessions))[1]
+
+    def likelihood(table: Observations) -> float:
+        """Return its logarithm: see `suspected`."""
+        count = independent(table)
+        return -sum(count[key] * float(np.log(size)) for key, size in _error(table).items())
+
+    over = beyond()
+    force, moment = (over.sum(axis=0) > MOST_BEYOND * len(over)).tolist()
+    if not (force or moment):
+        return ""
+    units = [each for each in LARGE_LOADS[force, moment] if beyond(each).mean() < 1.0 - NAMING]
+    found = {mistake: left(mistake) for mistake in (NO_LOAD, *units)}
+    logs = {mistake: likelihood(table) for mistake, table in found.items()}
+    best = max(logs, key=logs.__getitem__)
+    sure = 1.0 / sum(np.exp(each - logs[best]) for each in logs.values())
+    said = (
+        f"{LOOK_FIRST}: {over.any(axis=1).sum()} of {len(over)} measured poses are under a load "
+        "beyond the table's range"
+    )
+    # A load that is there, and too large for the table, fits the better the less is taken off it.
+    more = best.with_load(APART)
+    real = not beyond(more).any(axis=1).all() and likelihood(left(more)) > logs[best]
+    if best is NO_LOAD or real or sure < NAMING:
+        return f"{said}; check its unit (N, N m), its tare and the sensor's frame"
+    error = _error(found[best])
+    sizes = " and ".join(f"{error[q.key]:.3g} {q.unit} of {q.name}" for q in found[best].reported)
+    return f"{said}; with {best.without} the error is {sizes} ({percent(sure)} sure); {best.check}"

@@ -7,13 +7,11 @@ Nothing here needs a ROS installation: MCAP comes from the package ``mcap``, the
 from wrist_stiffness.recording.reader import Recording, open_recording
 from wrist_stiffness.recording.samples import Samples, read_samples
 from wrist_stiffness.recording.writer import RecordingWriter
-from wrist_stiffness.topics import parse_topic_remaps
 
 __all__ = [
     "Recording",
     "RecordingWriter",
     "Samples",
     "open_recording",
-    "parse_topic_remaps",
     "read_samples",
 ]

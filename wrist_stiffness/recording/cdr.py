@@ -6,8 +6,8 @@ encapsulation.  Strings are a 32-bit length that counts the closing zero, then U
 a 32-bit count, then the elements; an empty sequence is not followed by padding.
 
 Here is one message at a time, field by field.  The messages of a stream differ in their numbers
-only: `fixed_layout` and `batch` read and write those many times as fast, from the places that
-decoding one of them notes (`bench/recording_speed.py`).
+only: `fixed_layout` reads and writes those many times as fast, from the places that decoding one of
+them notes (`bench/recording_speed.py`).
 """
 
 from __future__ import annotations

@@ -49,14 +49,8 @@ def channel_of(topic: str, message_type: type[Message]) -> Channel:
 
 @cache
 def _channel_of(topic: str, ros_type: str) -> Channel:
-    return Channel(
-        topic=topic,
-        ros_type=ros_type,
-        message_encoding="cdr",
-        schema_encoding="ros2msg",
-        schema_text=definition_text(ros_type).encode(),
-        type_hash=type_hash(ros_type),
-    )
+    text = definition_text(ros_type).encode()
+    return Channel(topic, ros_type, "cdr", "ros2msg", text, type_hash(ros_type))
 
 
 UNREADABLE = (McapError, struct.error, ValueError)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.recording.batch import Batch, decode_batches
+from wrist_stiffness.recording.fixed_layout import Batch, decode_batches
 from wrist_stiffness.recording.mcap_chunk import Payloads
 from wrist_stiffness.recording.messages import (
     JointState,
@@ -70,8 +70,8 @@ def xyz(prefix: str) -> tuple[str, ...]:
 def joint_rows(joints: tuple[str, ...]) -> Extract:
     """Return the extraction of named joints from joint states, in the order of the names.
 
-    `joints`: names; other joints are ignored.  Its rows have position, velocity and
-    effort, each (m, number of joints).
+    `joints`: names; other joints are ignored.  Its rows have position and velocity, each (m, number
+    of joints).
     """
 
     def extract(batch: Batch) -> Rows | str:
@@ -82,14 +82,10 @@ def joint_rows(joints: tuple[str, ...]) -> Extract:
             return IGNORED
         if len(found) < len(joints) or len(message.position) != len(message.name):
             return _MISSING_JOINT
-        absent = np.full((batch.indices.size, len(joints)), np.nan)
-        columns = {
-            name: batch.columns[name][:, found]
-            if len(getattr(message, name)) == len(message.name)
-            else absent
-            for name in ("velocity", "effort")
-        }
-        return {"position": batch.columns["position"][:, found], **columns}
+        velocity = np.full((batch.indices.size, len(joints)), np.nan)
+        if len(message.velocity) == len(message.name):
+            velocity = batch.columns["velocity"][:, found]
+        return {"position": batch.columns["position"][:, found], "velocity": velocity}
 
     return extract
 
@@ -194,42 +190,38 @@ class Collector:
         """Return all rows in the order of reception, an empty dict without any."""
         if not self.blocks:
             return {}
-        if len(self.blocks) > 1:
-            self.blocks = [_joined(self.blocks)]
-        rows = self.blocks[0]
+        rows = _joined(self.blocks)
         if np.any(np.diff(rows["log_time_ns"]) < 0):
             received = np.argsort(rows["log_time_ns"], kind="stable")
             rows = {key: value[received] for key, value in rows.items()}
-            self.blocks = [rows]
+        self.blocks = [rows]
         return rows
 
     def faults(self) -> list[Fault]:
         """Return what was wrong, one entry for each kind."""
         rows = self.rows()
-        found = {kind: np.array(times) for kind, times in self.counts.items() if kind != IGNORED}
+        found = defaultdict(list, {kind: [*own] for kind, own in self.counts.items()})
+        found.pop(IGNORED, None)
         if rows:
             log_times = rows["log_time_ns"]
             for name in self.finite:
                 values = rows[name].reshape(log_times.size, -1)
-                found[f"{name} not finite"] = log_times[~np.isfinite(values).all(axis=1)]
-        if rows and self.message_type is not String:
-            # One temperature topic serves several components, each with stamps of its own.
-            groups = np.unique(rows["frame_id"]) if self.message_type is Temperature else [None]
-            steps = [self._steps(rows, group) for group in groups]
-            found["stamp repeated"] = np.concatenate([later[step == 0] for later, step in steps])
-            found["stamp running backwards"] = np.concatenate(
-                [later[step < 0] for later, step in steps]
-            )
+                found[f"{name} not finite"] += log_times[~np.isfinite(values).all(axis=1)].tolist()
+            for own in self._of_one_clock(rows):
+                step, later = np.diff(rows["time_ns"][own]), log_times[own][1:]
+                found["stamp repeated"] += later[step == 0].tolist()
+                found["stamp running backwards"] += later[step < 0].tolist()
         return [
-            Fault(self.topic, kind, int(times.size), int(times.min()))
+            Fault(self.topic, kind, len(times), min(times))
             for kind, times in found.items()
-            if times.size
+            if times
         ]
 
-    @staticmethod
-    def _steps(rows: Rows, group: str | None) -> tuple[TimeArray, TimeArray]:
-        chosen = slice(None) if group is None else rows["frame_id"] == group
-        return rows["log_time_ns"][chosen][1:], np.diff(rows["time_ns"][chosen])
+    def _of_one_clock(self, rows: Rows) -> list[Any]:
+        """Return which rows have stamps that must rise."""
+        if self.message_type is Temperature:  # one topic serves several components
+            return [rows["frame_id"] == name for name in np.unique(rows["frame_id"])]
+        return [] if self.message_type is String else [slice(None)]
 
     def _count(self, kind: str, times: TimeArray) -> None:
         if times.size:
@@ -237,4 +229,6 @@ class Collector:
 
 
 def _joined(parts: list[Rows]) -> Rows:
+    if len(parts) == 1:
+        return parts[0]
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -60,6 +60,8 @@ class Chunk:
     # `start_ns`, `end_ns`: first and last log time
     start_ns: int
     end_ns: int
+    # its messages as the file states them beside it; filled while the file is walked over
+    spans: Spans = field(default_factory=dict, compare=False)
 
     @property
     def place(self) -> str:
@@ -75,8 +77,10 @@ class Span:
     first_ns: int
     last_ns: int
 
-    def joined(self, other: Span) -> Span:
+    def joined(self, other: Span | None) -> Span:
         """Return the span over both."""
+        if other is None:
+            return self
         return Span(
             self.count + other.count,
             min(self.first_ns, other.first_ns),

@@ -89,9 +89,7 @@ _MOST_CANDIDATES = 10_000
 class McapIndex:
     """Contents of one MCAP file."""
 
-    # `chunks`, `chunk_spans`: in the order of the file
-    chunks: list[Chunk]
-    chunk_spans: list[Spans]
+    chunks: list[Chunk]  # in the order of the file
     definitions: Definitions  # channels and schemas as the file has them
     channels: dict[int, Channel]  # by channel id
     flaws: list[str]  # what is wrong with it, as far as the walk sees
@@ -99,7 +97,11 @@ class McapIndex:
     @property
     def spans(self) -> Spans:
         """Messages of the whole file."""
-        return _sum(self.chunk_spans)
+        total: Spans = {}
+        for chunk in self.chunks:
+            for number, span in chunk.spans.items():
+                total[number] = span.joined(total.get(number))
+        return total
 
     def told(self, spans: Spans) -> str:
         """Return messages as a text: how many, of which topic, when."""
@@ -109,10 +111,9 @@ class McapIndex:
             parts.append(f"{span.count} of {topic} ({span.first_ns} to {span.last_ns} ns)")
         return ", ".join(parts) or "unknown messages"
 
-    def disagreement(self, contents: Contents, position: int) -> str:
+    def disagreement(self, contents: Contents, chunk: Chunk) -> str:
         """Return how the content of a chunk differs from what the file says of it, or nothing."""
-        chunk, stated = self.chunks[position], self.chunk_spans[position]
-        place = chunk.place
+        place, stated = chunk.place, chunk.spans
         if (last_ns := max((s.last_ns for s in contents.spans.values()), default=0)) > chunk.end_ns:
             return f"{place} is stated to end at {chunk.end_ns} ns, it ends at {last_ns} ns"
         if stated != contents.spans:
@@ -138,20 +139,11 @@ def index_mcap(path: Path) -> McapIndex:
             raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
 
 
-def _sum(parts: list[Spans]) -> Spans:
-    total: Spans = {}
-    for part in parts:
-        for number, span in part.items():
-            total[number] = total[number].joined(span) if number in total else span
-    return total
-
-
 @dataclass
 class _Walk:
     path: Path
     stream: BinaryIO
     chunks: list[Chunk] = field(default_factory=list)
-    chunk_spans: list[Spans] = field(default_factory=list)
     data: Definitions = field(default_factory=dict)
     summary: Definitions = field(default_factory=dict)
     stated: mcap.records.Statistics | None = None
@@ -161,7 +153,8 @@ class _Walk:
     summary_start: int = 0
     # Of chunks that were not understood, as far as their index tells.
     lost: list[Spans] = field(default_factory=list)
-    last_is_lost: bool = False
+    # Of the chunk to which an index would belong.
+    indexed: Spans = field(default_factory=dict)
     unknown: list[str] = field(default_factory=list)
 
     def index(self) -> McapIndex:
@@ -178,7 +171,7 @@ class _Walk:
         self._look_into_chunks()
         for key, found in self.summary.items():
             self._define(key, found, "the summary")
-        index = McapIndex(self.chunks, self.chunk_spans, self.data, channels_of(self.data), [])
+        index = McapIndex(self.chunks, self.data, channels_of(self.data), [])
         self._compare_counts(index)
         if self.flaws:
             readable = sum(span.count for span in index.spans.values())
@@ -243,13 +236,13 @@ class _Walk:
 
     def _forget_last_index(self) -> None:
         """Leave the last chunk to be looked into: the damage may have taken a part of its index."""
-        if self.chunk_spans and not self.last_is_lost:
-            self.chunk_spans[-1].clear()
+        if self.chunks and self.indexed is self.chunks[-1].spans:
+            self.indexed.clear()
         self._lose_chunk()
 
     def _lose_chunk(self) -> None:
-        self.last_is_lost = True
-        self.lost.append({})
+        self.indexed = {}
+        self.lost.append(self.indexed)
 
     def _definition(self, opcode: int, _: int, length: int) -> None:
         key, found = definition(opcode, self.stream.read(length))
@@ -275,11 +268,11 @@ class _Walk:
         if head_size + size != length:
             raise ValueError(f"{size} bytes stated in a chunk record of {length} bytes")
         offset = content + head_size
-        self.chunks.append(
-            Chunk(self.path, offset, size, compression, uncompressed_size, crc, start_ns, end_ns)
+        chunk = Chunk(
+            self.path, offset, size, compression, uncompressed_size, crc, start_ns, end_ns
         )
-        self.chunk_spans.append({})
-        self.last_is_lost = False
+        self.chunks.append(chunk)
+        self.indexed = chunk.spans
 
     def _message_index(self, _: int, length: int) -> None:
         data = self.stream.read(length)
@@ -288,27 +281,22 @@ class _Walk:
         if _INDEX_HEAD.size + size != length or size % 16:
             raise ValueError(f"index of {size} bytes in a record of {length} bytes")
         times = entries[::2]
-        if not times.size or not (self.chunks or self.lost):
-            return
-        spans = self.lost[-1] if self.last_is_lost else self.chunk_spans[-1]
-        spans[channel_id] = Span(times.size, int(times.min()), int(times.max()))
+        if times.size:
+            self.indexed[channel_id] = Span(times.size, int(times.min()), int(times.max()))
 
     def _loose_message(self, content: int, length: int) -> None:
         channel_id, _, time_ns, _ = _MESSAGE_HEAD.unpack(self.stream.read(_MESSAGE_HEAD.size))
-        begin, end = content - RECORD_HEAD.size, content + length
+        begin, end, span = content - RECORD_HEAD.size, content + length, Span(1, time_ns, time_ns)
         if self.loose_run_is_open and self.chunks[-1].size < _LOOSE_RUN_BYTES:
             last = self.chunks.pop()
-            begin = last.offset
+            begin, spans = last.offset, last.spans
             times = (min(last.start_ns, time_ns), max(last.end_ns, time_ns))
         else:
-            self.chunk_spans.append({})
-            times = (time_ns, time_ns)
+            spans, times = {}, (time_ns, time_ns)
+        spans[channel_id] = span.joined(spans.get(channel_id))
         size = end - begin
-        self.chunks.append(Chunk(self.path, begin, size, "", size, 0, *times))
-        spans = self.chunk_spans[-1]
-        span = Span(1, time_ns, time_ns)
-        spans[channel_id] = spans[channel_id].joined(span) if channel_id in spans else span
-        self.loose_run_is_open = True
+        self.chunks.append(Chunk(self.path, begin, size, "", size, 0, *times, spans))
+        self.indexed, self.loose_run_is_open = spans, True
 
     def _data_end(self, content: int, _: int) -> None:
         (crc,) = struct.unpack("<I", self.stream.read(4))
@@ -361,9 +349,9 @@ class _Walk:
         A chunk that turns out to be unreadable is left for the reader, which reports it.
         """
         known = {number for kind, number in (*self.data, *self.summary) if kind == Opcode.CHANNEL}
-        indexed = {channel_id for spans in self.chunk_spans for channel_id in spans}
-        for chunk, spans in zip(self.chunks, self.chunk_spans, strict=True):
-            if spans and indexed <= known:
+        indexed = {channel_id for chunk in self.chunks for channel_id in chunk.spans}
+        for chunk in self.chunks:
+            if chunk.spans and indexed <= known:
                 continue
             try:
                 contents = contents_of(chunk)
@@ -372,7 +360,7 @@ class _Walk:
                 continue
             for key, found in definitions.items():
                 self._define(key, found, chunk.place)
-            spans.update(contents.spans)
+            chunk.spans.update(contents.spans)
 
 
 def _next_record(stream: BinaryIO, position: int, size: int) -> int | None:

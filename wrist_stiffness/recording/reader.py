@@ -40,18 +40,18 @@ class TopicInfo:
     # `first_ns`, `last_ns`: log time of the first and last message; None without messages
     first_ns: int | None
     last_ns: int | None
-    is_readable: bool  # whether the type is one that this project decodes
 
 
 def topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:
     """Return the topics of files that belong together, by name."""
-    spans: dict[tuple[str, str, bool], Span | None] = {}
+    spans: dict[tuple[str, str], Span | None] = {}
     for index in indices:
         own = index.spans
         for channel_id, channel in index.channels.items():
-            key = (channel.topic, channel.ros_type, channel.message_type is not None)
-            span, known = own.get(channel_id), spans.get(key)
-            spans[key] = span.joined(known) if span and known else span or known
+            key = channel.topic, channel.ros_type
+            known = spans.setdefault(key, None)
+            if span := own.get(channel_id):
+                spans[key] = span.joined(known)
     return tuple(
         TopicInfo(
             name=name,
@@ -59,9 +59,8 @@ def topics_of(indices: list[McapIndex]) -> tuple[TopicInfo, ...]:
             count=span.count if span else 0,
             first_ns=span.first_ns if span else None,
             last_ns=span.last_ns if span else None,
-            is_readable=is_readable,
         )
-        for (name, ros_type, is_readable), span in sorted(spans.items(), key=lambda item: item[0])
+        for (name, ros_type), span in sorted(spans.items(), key=lambda item: item[0])
     )
 
 
@@ -166,18 +165,13 @@ class Recording:
 
     def _parts(self, topics: Collection[str] | None) -> Iterator[RawBlock]:
         """Yield messages by log time, ties in the order of the file, about a chunk at a time."""
-        chunks = [
-            (chunk, index, position)
-            for index in self._indices
-            for position, chunk in enumerate(index.chunks)
-        ]
+        chunks = [(chunk, index) for index in self._indices for chunk in index.chunks]
         # Chunks that were opened, by their place in the recording: what is left of them.
         opened: dict[int, RawBlock] = {}
         for order in sorted(range(len(chunks)), key=lambda order: chunks[order][0].start_ns):
-            chunk, index, position = chunks[order]
+            chunk, index = chunks[order]
             yield from _earlier(opened, chunk.start_ns, order)
-            contents = self._contents(index, position)
-            if contents is None:
+            if (contents := self._contents(index, chunk)) is None:
                 continue
             channels = {
                 number: channel
@@ -211,20 +205,19 @@ class Recording:
                 channel = part.channels[int(part.channel[place])]
                 yield channel.topic, int(part.time_ns[place]), message
 
-    def _contents(self, index: McapIndex, position: int) -> Contents | None:
+    def _contents(self, index: McapIndex, chunk: Chunk) -> Contents | None:
         """Unpack a chunk; report what is wrong with it, None where it cannot be read.
 
         Those of late stay at hand: a replay reads the loads of a chunk some time before the rest.
         """
-        chunk = index.chunks[position]
         if (contents := self._recent.get(chunk)) is not None:
             return contents
         try:
             contents = contents_of(chunk)
-            if flaw := index.disagreement(contents, position):
+            if flaw := index.disagreement(contents, chunk):
                 self._flaws[flaw] = None
         except RecordingError as error:
-            self._flaws[f"{error}, left out: {index.told(index.chunk_spans[position])}"] = None
+            self._flaws[f"{error}, left out: {index.told(chunk.spans)}"] = None
             return None
         self._recent[chunk] = contents
         while sum(kept.uncompressed_size for kept in self._recent) > RECENT_BYTES:

@@ -8,7 +8,7 @@ payload that cannot be decoded) is left out, and counted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -62,14 +62,10 @@ class HeaderSamples:
 
 @dataclass(frozen=True)
 class JointSamples(HeaderSamples):
-    """Two joints: positions, velocities, efforts (n, 2) [rad, N m].
-
-    Velocity and effort are NaN where the message has none.
-    """
+    """Two joints: positions and velocities (n, 2) [rad, rad/s]; NaN where a message has none."""
 
     position: FloatArray
     velocity: FloatArray
-    effort: FloatArray
 
 
 @dataclass(frozen=True)
@@ -112,14 +108,13 @@ class ScalarSamples(HeaderSamples):
 
 @dataclass(frozen=True)
 class Samples:
-    """All that the wrist's topics hold; a topic that is absent gives arrays of length 0.
+    """What was measured on the wrist; a topic that is absent gives arrays of length 0.
 
     `temperatures` are by component, `covariates` by the name below ``/covariates/``, `notes` the
     texts of ``/recording_notes``.
     """
 
     joints: JointSamples
-    commands: JointSamples
     loads: WrenchSamples
     poses: PoseSamples
     frame_poses: PoseSamples
@@ -136,9 +131,8 @@ def read_samples(
     *,
     remaps: Mapping[str, str] | None = None,
     joints: Sequence[str] = DEFAULT_JOINTS,
-    without: Collection[str] = (),
 ) -> Samples:
-    """Read the wrist's topics of a recording into arrays.
+    """Read the measurements of a recording into arrays.
 
     Parameters
     ----------
@@ -149,8 +143,6 @@ def read_samples(
     joints : Sequence[str]
         Names of motor 1 and motor 2; other joints are ignored, and so are messages of a shared
         joint state topic that name neither.
-    without : Collection[str]
-        Standard names of topics that are not needed; they come back empty.
 
     Returns
     -------
@@ -164,11 +156,7 @@ def read_samples(
         never names both joints.
     """
     remaps = dict(remaps or {})
-    collectors = {
-        topic: collector
-        for topic, collector in _collectors_of(recording, remaps, tuple(joints)).items()
-        if topic not in {remaps.get(standard, standard) for standard in without}
-    }
+    collectors = _collectors_of(recording, remaps, tuple(joints))
     for topic, log_times, payloads in recording.payloads(collectors.keys()):
         collectors[topic].add(log_times, payloads)
 
@@ -176,36 +164,28 @@ def read_samples(
         collector = collectors.get(remaps.get(standard, standard))
         return collector.rows() if collector else {}
 
-    def joint_samples(standard: str) -> JointSamples:
-        rows = of(standard)
-        collector = collectors.get(remaps.get(standard, standard))
-        if collector and collector.counts and not rows:
-            raise RecordingError(
-                f"{recording.path}: {collector.topic} never names {' and '.join(joints)} together"
-                f"{_first_names(recording, collector.topic)}"
-            )
-        return _made(JointSamples, rows, position=(2,), velocity=(2,), effort=(2,))
-
-    def group(standard: str) -> dict[str, Rows]:
-        rows = of(standard)
-        found = rows.get("frame_id", np.empty(0, np.str_))
-        return {
-            str(name): {key: column[found == name] for key, column in rows.items()}
-            for name in np.unique(found)
-        }
-
-    covariates = _covariates(recording, remaps)
+    covariates, warmth = _covariates(recording, remaps), of(names.TEMPERATURES)
+    component = warmth.get("frame_id", np.empty(0, np.str_))
+    stated = collectors.get(remaps.get(names.JOINT_STATES, names.JOINT_STATES))
+    if stated and stated.counts and not stated.rows():
+        raise RecordingError(
+            f"{recording.path}: {stated.topic} never names {' and '.join(joints)} together"
+            f"{_first_names(recording, stated.topic)}"
+        )
     return Samples(
-        joints=joint_samples(names.JOINT_STATES),
-        commands=joint_samples(names.MOTOR_COMMANDS),
+        joints=_made(JointSamples, of(names.JOINT_STATES), position=(2,), velocity=(2,)),
         loads=_made(WrenchSamples, of(names.LOAD_ESTIMATE), wrench=(6,)),
         poses=_pose_samples(of(names.PLATFORM_POSE)),
         frame_poses=_pose_samples(of(names.FRAME_POSE)),
         markers=_made(MarkerSamples, of(names.PLATFORM_MARKERS), position=(0, 3)),
         gauges=_made(GaugeSamples, of(names.GAUGE_READINGS), value=(0,), names=(0,)),
         temperatures={
-            component: _made(ScalarSamples, rows, value=())
-            for component, rows in group(names.TEMPERATURES).items()
+            str(name): _made(
+                ScalarSamples,
+                {key: column[component == name] for key, column in warmth.items()},
+                value=(),
+            )
+            for name in np.unique(component)
         },
         covariates={
             name: _made(ScalarSamples, collectors[topic].rows(), value=())
@@ -272,7 +252,6 @@ def _collectors_of(
     wrench = stacked(wrench=(*xyz("wrench.force"), *xyz("wrench.torque")))
     wanted: dict[str, list[tuple[type[Message], Extract, tuple[str, ...]]]] = {
         names.JOINT_STATES: [(JointState, joint_rows(joints), ("position",))],
-        names.MOTOR_COMMANDS: [(JointState, joint_rows(joints), ("position",))],
         names.LOAD_ESTIMATE: [(WrenchStamped, wrench, ("wrench",))],
         names.PLATFORM_MARKERS: [(PoseArray, marker_rows(), ())],
         names.GAUGE_READINGS: [(JointState, gauge_rows(), ())],

@@ -123,7 +123,7 @@ def _bars(compared: Compared) -> Picture:
             _label(q),
             [model.name for model in found.models],
             [model.after[q.key].rms for model in found.models],
-            [model.after[q.key].uncertainty for model in found.models],
+            [model.after[q.key].rms_uncertainty for model in found.models],
             {
                 "instrument noise": found.noise[q.key],
                 "laws of the conditions": found.reachable[q.key],
@@ -148,7 +148,7 @@ def _sizes(compared: Compared) -> Table:
         for stage, sizes in (("as it stands", model.before), ("refitted", model.after)):
             row = [model.name, stage]
             for size in (sizes[q.key] for q in found.quantities):
-                row += map(number, (size.mean, size.rms, size.maximum))
+                row += map(number, (size.mean, size.rms, size.max))
             rows.append(row)
     caption = "Error of every dwell and half second in motion, before and after the refit."
     return Table(caption, head, rows)

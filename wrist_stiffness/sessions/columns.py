@@ -46,7 +46,7 @@ class SessionModel:
 
     def remembers(self, effects: Effects) -> bool:
         """Tell whether any of the effects needs the path and not the mean moment alone."""
-        return any(self._has_memory(effect) for effect in effects)
+        return any(each.law.many_waves or self._has_past(each) for each in effects)
 
     def held(self, effects: Effects) -> dict[str, Effect]:
         """Return those effects that have a past, by name, doing what they do beside all others."""
@@ -60,9 +60,6 @@ class SessionModel:
             law = HeldLaw(each, [chunk[each.name] for chunk in chunks])
             found[each.name] = Effect(law, each.component)
         return found
-
-    def _has_memory(self, effect: Effect) -> bool:
-        return effect.law.many_waves or self._has_past(effect)
 
     def _has_past(self, effect: Effect) -> bool:
         """Tell whether earlier moments decide what an effect does.

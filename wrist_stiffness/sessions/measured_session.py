@@ -25,7 +25,7 @@ class MeasuredSession:
     measured carry the path of angles and load between two measurements, which friction, backlash
     and creep remember.
 
-    Raises `InputError` if there is no measurement, or the shapes do not belong together.
+    Raises `InputError` if there is no measurement.
     """
 
     name: str  # for reports: the recording's file name
@@ -49,14 +49,9 @@ class MeasuredSession:
     readings: Array | None = None
 
     def __post_init__(self) -> None:
-        """Check the shapes."""
-        n = len(self.block)
-        if n == 0:
+        """Refuse what is empty."""
+        if len(self.block) == 0:
             raise InputError(f"{self.name}: no measured pose")
-        for name, shape in {"shift": (n, 3), "rotation": (n, 3, 3)}.items():
-            if np.shape(getattr(self, name)) != shape:
-                found = np.shape(getattr(self, name))
-                raise InputError(f"{self.name}: {name} has shape {found}, not {shape}")
 
     def __len__(self) -> int:
         """Return the number of rows."""

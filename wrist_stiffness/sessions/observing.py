@@ -14,8 +14,7 @@ from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import cleared
-from wrist_stiffness.sessions.measured_session import MeasuredSession
-from wrist_stiffness.sessions.unit_session import UnitSession, all_units
+from wrist_stiffness.sessions.unit_session import UnitSession
 from wrist_stiffness.sessions.units import COUNTS, SPARSE_S, WINDOW_S, Cut, Labels
 
 WANDER = {"um": 0.5e-6, "mdeg": 5e-6}
@@ -54,31 +53,22 @@ def without_mounting(table: Observations, values: Array) -> Array:
     return cleared(values, table.common, usual_wander(table.quantities))
 
 
-def observe(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> Observed:
-    """Compare a model with sessions in the order of time, unit by unit.
-
-    Only units in the table's domain and load range count.  Raises `InputError` if there is no
-    session, nothing of one lies in the model's range, or no unit was measured.
-    """
-    if not sessions:
-        raise InputError("no session to compare the model with")
-    cuts = all_units(model, sessions)
-    predicted = np.concatenate([predict_units(model, each) for each in cuts])
-    return tabulate(model, cuts, predicted)
-
-
 def predict_units(model: ErrorModel, session: UnitSession) -> Array:
     """Return the predicted pose error of each unit as the sensor says it, (u, 6) [m, rad]."""
     return session.mean_twist(model.batch(session.block).measured)
 
 
-def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array) -> Observed:
+def tabulate(
+    model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Array | None = None
+) -> Observed:
     """Return the table of residuals of units against a prediction of them.
 
     `model`: its kinematics and encoder step tell what the encoders hide; `sessions`: in the order
     of time, u units together; `predicted` (u, 6): pose error of the units, as the sensor would say
-    it [m, rad].  Raises `InputError` if no unit was measured.
+    it, by default the model's [m, rad].  Raises `InputError` if no unit was measured.
     """
+    if predicted is None:
+        predicted = np.concatenate([predict_units(model, each) for each in sessions])
     parts = np.split(predicted, np.cumsum([len(each) for each in sessions])[:-1])
     values = np.concatenate(
         [each.residual(part) for each, part in zip(sessions, parts, strict=True)]
@@ -103,17 +93,15 @@ def tabulate(model: ErrorModel, sessions: tuple[UnitSession, ...], predicted: Ar
         sessions[0].quantities,
         stand=stand,
         shared=counts,
-        common=_common(sessions),
+        common=side_by_side([s.common for s in sessions]) if sessions[0].gauges else None,
     )
     return Observed(sessions, predicted, replace(observations.take(used), row=None))
 
 
-def _common(sessions: Sequence[UnitSession]) -> Array | None:
-    """Return what the mountings of all sessions' gauges do to the units, (u, m, q)."""
-    if sessions[0].gauges is None:
-        return None
-    flat = block_diag(*(each.common.reshape(-1, each.common.shape[2]) for each in sessions))
-    return np.asarray(flat.reshape(-1, sessions[0].values.shape[1], flat.shape[1]))
+def side_by_side(columns: Sequence[Array]) -> Array:
+    """Return what each session's columns do to its own units, as columns of all units (u, m, q)."""
+    flat = block_diag(*(each.reshape(-1, each.shape[2]) for each in columns))
+    return np.asarray(flat.reshape(-1, columns[0].shape[1], flat.shape[1]))
 
 
 def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
@@ -201,12 +189,8 @@ def hidden_counts(table: Table, cut: Cut, theta: Array) -> Array:
 
 def counts_known(cut: Cut, step: float) -> Array:
     """Return how many counts of their own the mean angles of units rest on, (u, 2)."""
-    used = cut.unit >= 0
-    unit, theta = cut.unit[used], cut.block.theta[used]
-    low, high = np.full((2, len(cut.dwell), 2), np.nan)
-    np.fmin.at(low, unit, theta)
-    np.fmax.at(high, unit, theta)
-    moments = np.bincount(unit, minlength=len(low))[:, None]
+    low, high = cut.extremes(cut.block.theta)
+    moments = np.bincount(cut.unit[cut.unit >= 0], minlength=len(low))[:, None]
     return np.clip((high - low) / step, 1.0, np.where(cut.dwell[:, None], 1.0, moments))
 
 
@@ -255,13 +239,8 @@ def _stands(cut: Cut, step: float, longest_s: float) -> Labels:
         moved = bool(late[moment] or (np.abs(theta[moment] - begun) > COUNTS * step).any())
         begun = theta[moment] if moved else begun
         number[moment] = number[moment - 1] + moved
-    used = cut.unit >= 0
-    unit, number = cut.unit[used], number[used]
-    first, last = np.full(len(cut.dwell), len(theta)), np.full(len(cut.dwell), -1)
-    np.minimum.at(first, unit, number)
-    np.maximum.at(last, unit, number)
-    moving = np.zeros(len(cut.dwell), dtype=bool)
+    first, last = cut.extremes(number)
     # A count that flickers at rest is as fast at its moment as a slow motion.
-    fast = (np.abs(cut.mean_speed[used]) > COUNTS * step / WINDOW_S).any(axis=1)
-    np.logical_or.at(moving, unit, fast)
-    return np.where((first == last) & (cut.dwell | ~moving), first, -1)
+    fastest = cut.extremes(np.abs(cut.mean_speed))[1].max(axis=1)
+    still = cut.dwell | (fastest <= COUNTS * step / WINDOW_S)
+    return np.where((first == last) & still, first, -1.0).astype(np.intp)

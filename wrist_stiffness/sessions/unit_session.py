@@ -144,12 +144,7 @@ class UnitSession:
     @property
     def span(self) -> Array:
         """First and last moment of each unit, (u, 2) [s]."""
-        used = self.cut.unit >= 0
-        unit, time = self.cut.unit[used], self.block.time[used]
-        span = np.tile([np.inf, -np.inf], (len(self), 1))
-        np.minimum.at(span[:, 0], unit, time)
-        np.maximum.at(span[:, 1], unit, time)
-        return span
+        return np.stack(self.cut.extremes(self.block.time), axis=1)
 
     @cached_property
     def known(self) -> dict[Any, Any]:

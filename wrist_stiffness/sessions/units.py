@@ -80,6 +80,14 @@ class Cut:
             mean_speed=self.mean_speed[used],
         )
 
+    def extremes(self, values: Array | Labels) -> tuple[Array, Array]:
+        """Return the least and largest in each unit (u, ...) of values at kept moments (k, ...)."""
+        used = self.unit >= 0
+        least, largest = np.full((2, len(self.dwell), *values.shape[1:]), np.nan)
+        np.fmin.at(least, self.unit[used], values[used])
+        np.fmax.at(largest, self.unit[used], values[used])
+        return least, largest
+
     def of_units(self, chosen: Labels) -> Cut:
         """Return some of the units (c,) in their order; moments of the others tell the path."""
         number = np.full(len(self.dwell) + 1, -1)

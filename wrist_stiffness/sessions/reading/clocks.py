@@ -89,6 +89,8 @@ class _Motion:
     @classmethod
     def of(cls, time_ns: Stamps, measured: Array, rigid: Signal) -> _Motion | None:
         """Return the motion that both saw; None where nothing moves."""
+        known = np.isfinite(measured).all(axis=(1, 2))
+        time_ns, measured = time_ns[known], measured[known]
         if len(rigid) < 2 or len(time_ns) == 0:
             return None
         first = np.unique(np.linspace(0, len(time_ns) - 1, STAMPS_USED).astype(int))
@@ -96,7 +98,7 @@ class _Motion:
         first, second = first[second < len(time_ns)], second[second < len(time_ns)]
         start, end = (1e-9 * (time_ns[rows] - rigid.time_ns[0]) for rows in (first, second))
         own = 1e-9 * (rigid.time_ns - rigid.time_ns[0])
-        continuous = _continuous(rigid.values)
+        continuous = _continuous(Rotation.from_matrix(rigid.values).as_quat())
         slope = np.diff(continuous, axis=0) / np.diff(own)[:, None]
         began, ended = (Rotation.from_matrix(measured[rows]) for rows in (first, second))
         turned = (ended * began.inv()).magnitude()
@@ -138,8 +140,8 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
     stands and how the target sits.
 
     `time_ns` (n,) int64: stamps of the measured rotations [ns]; `measured` (n, 3, 3): rotations U
-    -> F; `rigid`: quaternions (m, 4) of the rigid wrist by the stamps of the joint states.  Gives
-    None where nothing moves, or too few stamps overlap.
+    -> F, NaN = not measured; `rigid`: those of the rigid wrist (m, 3, 3) by the stamps of the joint
+    states.  Gives None where nothing moves, or too few stamps overlap.
     """
     motion = _Motion.of(time_ns, measured, rigid)
     if motion is None:

@@ -121,15 +121,14 @@ def turn_left(measured: Array, rigid: Array) -> Array:
     )
 
 
-def place_left(shift: Array, rigid: Array) -> tuple[Array, float]:
+def place_left(shift: Array, rigid: Array) -> tuple[Array, Array]:
     """Return what a constant place of the target in U and one in F leave of positions.
 
     `shift` (n, 3): measured positions [m]; NaN = not measured; `rigid` (n, 3, 3): U -> F.  Gives
-    `left` (n, 3): [m], and `lever`: distance of the target from its place in U, as far as motion
-    tells it [m].
+    `left` (n, 3): [m], and `target` (3,): that place in U, as far as motion tells it [m].
     """
     target, origin = places_of(shift, rigid)
-    return shift - rigid @ target - origin, float(np.linalg.norm(target))
+    return shift - rigid @ target - origin, target
 
 
 def places_of(shift: Array, rigid: Array) -> tuple[Array, Array]:

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.settings import StreamSettings
@@ -29,9 +28,9 @@ from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
-from wrist_stiffness.sessions.reading.clocks import ClockOffset, clock_offset, clock_step
+from wrist_stiffness.sessions.reading.clocks import ClockOffset, ClockStep, clock_offset, clock_step
 from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings, held_to
-from wrist_stiffness.sessions.reading.lost_beams import lost_beams
+from wrist_stiffness.sessions.reading.lost_beams import lost_beams, stood_still
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
 from wrist_stiffness.sessions.reading.pose_track import MeasuredTrack, pose_track
 from wrist_stiffness.sessions.reading.refusals import (
@@ -44,8 +43,6 @@ from wrist_stiffness.sessions.reading.refusals import (
 from wrist_stiffness.sessions.reading.registration import registered
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps, in_any, last_of_equal
 from wrist_stiffness.sessions.reading.static_frames import KnownFrames, frames_of
-from wrist_stiffness.sessions.reading.stood_still import stood_still
-from wrist_stiffness.topics import MOTOR_COMMANDS
 
 GEOMETRY = "geometry_sha256"
 """Key of the notes: checksum of the geometry file of the wrist that was recorded."""
@@ -61,6 +58,9 @@ OWN_CLOCK_PERIODS = 5.0
 
 OWN_CLOCK_GAIN = 4.0
 """An offset that divides the mean square of the misfit by less is not believed."""
+
+CERTAIN = 3.0
+"""Nor is one of fewer standard uncertainties."""
 
 GAP_S = 0.2
 """Poses that are nearer to each other tell the path themselves [s]."""
@@ -131,7 +131,7 @@ def opened(
     """
     recording = open_recording(path)
     joints = settings.motors.motor_1, settings.motors.motor_2
-    samples = read_samples(recording, remaps=remaps, joints=joints, without=(MOTOR_COMMANDS,))
+    samples = read_samples(recording, remaps=remaps, joints=joints)
     require_topics(recording, samples, remaps)
     return recording, samples, frames_of(recording, remaps, settings.frames)
 
@@ -149,15 +149,22 @@ def session_of(
     require_overlap(machine.angles.time_ns, track.time_ns)
     recorded = len(track)
     track = track.take(~in_any(machine.twice, track.time_ns))
-    track, offset = _by_one_clock(machine, _without_still(machine, track, table), table)
-    remarks, late = [*machine.remarks, *track.remarks], offset
-    if offset is not None and _another_clock(offset, machine, track):
+    motion = _rigid_motion(machine, table)
+    track = _without_still(machine, track, table, motion)
+    track, offset = _by_one_clock(machine, track, motion)
+    remarks, late_s = [*machine.remarks, *track.remarks], 0.0
+    if (
+        offset is not None
+        and offset.gain > OWN_CLOCK_GAIN
+        and _is_of_clocks(offset, machine, track)
+    ):
         remarks.append(
             f"the clock of the pose sensor is {offset.seconds:+.3f} s (uncertain by "
             f"{offset.sigma:.3f} s) from that of the joint states: taken out"
         )
         track = replace(track, time_ns=track.time_ns - round(offset.seconds * NANOSECONDS))
-        late = None
+    elif offset is not None and abs(offset.seconds) > CERTAIN * offset.sigma:
+        late_s = offset.seconds
     usable, reasons = machine.usable(track.time_ns)
     remarks += reasons
     theta = machine.angles.interpolated(track.time_ns[usable])
@@ -169,13 +176,14 @@ def session_of(
     usable[usable] = reachable
     if not usable.any():
         raise InputError(f"no measured pose can be used: {'; '.join(remarks)}")
-    time_ns, shift, rotation = track.time_ns[usable], track.shift[usable], track.rotation[usable]
-    all_ns = np.union1d(time_ns, path_stamps(machine, time_ns, table))
-    rows = np.searchsorted(all_ns, time_ns)
+    track = track.take(usable)
+    all_ns = np.union1d(track.time_ns, path_stamps(machine, track.time_ns, table))
+    rows = np.searchsorted(all_ns, track.time_ns)
     block = machine.at(all_ns)
     measured = block.take(rows)
     rigid = rigid_rotation(table, measured.theta)
-    covariance, gauges, readings = track.covariance, track.gauges, track.readings
+    shift, rotation, covariance = track.shift, track.rotation, track.covariance
+    gauges, readings = track.gauges, track.readings
     if track.unplaced:
         found = registered(shift, rotation, rigid)
         shift, rotation = found.in_base(shift, rotation)
@@ -184,11 +192,13 @@ def session_of(
     require_same_wrist(rotation, rigid, measured.theta, table)
     require_near(shift)
     if gauges is not None and readings is not None:
-        gauges, readings, said = held_to(gauges, readings[usable], rigid)
+        gauges, readings, said = held_to(gauges, readings, rigid)
         readings = _spread(readings, rows, len(block))
         remarks += said
     remarks += beyond_range(table, measured)
-    meant = _rigid_when_measured(machine, time_ns, late, table, rigid)
+    # The rigid rotations at the moments of the poses, not at their late stamps.
+    meant = _rigid_at(machine, track.time_ns, late_s, table) if late_s else rigid
+    meant = np.where(np.isfinite(meant), meant, rigid)
     step = table.geometry.limits.encoder_step
     lost = lost_beams(measured.time, shift, rotation, meant, step)
     if lost.any():
@@ -213,27 +223,31 @@ def session_of(
     return session
 
 
-def _without_still(machine: MachineSignals, track: MeasuredTrack, table: Table) -> MeasuredTrack:
+def _without_still(
+    machine: MachineSignals, track: MeasuredTrack, table: Table, motion: Signal
+) -> MeasuredTrack:
     """Return the track without poses that its instrument only sent again."""
     if track.repeats is None or not track.repeats.any():
         return track
     # What repeats tells nothing of the clocks: it may be a pose of long ago.
-    late = _offset(machine, track.take(~track.repeats), table)
+    once = ~track.repeats
+    late = clock_offset(track.time_ns[once], track.rotation[once], motion)
     if late is not None and not late.fits and abs(late.seconds) > OWN_CLOCK_S:
         return track
-    moments = _moments(track.time_ns, late)
-    theta = _angles(machine, moments)
-    rows = np.flatnonzero(machine.usable(moments)[0] & table.mechanism.reachable(theta))
+    late_s = 0.0 if late is None else late.seconds
+    rigid = _rigid_at(machine, track.time_ns, late_s, table)
+    usable, _ = machine.usable(track.time_ns - round(late_s * NANOSECONDS))
+    rows = np.flatnonzero(usable & np.isfinite(rigid).all(axis=(1, 2)))
     if track.repeats[rows].all():
         return track
-    known, rigid = track.take(rows), rigid_rotation(table, theta[rows])
+    known = track.take(rows)
     time = (known.time_ns - known.time_ns[0]) / NANOSECONDS
     still = np.zeros(len(track), dtype=bool)
     still[rows] = stood_still(
         time,
         known.shift,
         known.rotation,
-        rigid,
+        rigid[rows],
         track.repeats[rows],
         table.geometry.limits.encoder_step,
     )
@@ -308,97 +322,70 @@ def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
     return out
 
 
+def _rigid_motion(machine: MachineSignals, table: Table) -> Signal:
+    """Return the rotations of the rigid wrist, of as many joint states as tell clocks apart."""
+    every = max(1, len(machine.angles) // ANGLES_USED)
+    theta, time_ns = machine.angles.values[::every], machine.angles.time_ns[::every]
+    reachable = table.mechanism.reachable(theta)
+    return Signal(time_ns[reachable], rigid_rotation(table, theta[reachable]))
+
+
 def _by_one_clock(
-    machine: MachineSignals, track: MeasuredTrack, table: Table
+    machine: MachineSignals, track: MeasuredTrack, motion: Signal
 ) -> tuple[MeasuredTrack, ClockOffset | None]:
     """Return the track, its clock followed where it or that of the joint states was set, and that.
 
     The offset is what is left between the two clocks.  What fits no better is not followed.
     """
-    offset = _offset(machine, track, table)
+    began = min(machine.angles.time_ns[0], track.time_ns[0])
+    offset = clock_offset(track.time_ns, track.rotation, motion)
     while offset is not None and not offset.fits:
-        followed = _one_step(machine, track, table)
-        left = None if followed is None else _offset(machine, followed, table)
-        if followed is None or left is None or left.misfit >= offset.misfit:
+        step = clock_step(track.time_ns, track.rotation, motion, OWN_CLOCK_GAIN)
+        if step is None or not _is_of_clocks(step, machine, track):
+            break
+        followed = _followed(track, step, began)
+        left = clock_offset(followed.time_ns, followed.rotation, motion)
+        if left is None or left.misfit >= offset.misfit:
             break
         track, offset = followed, left
     return track, offset
 
 
-def _one_step(machine: MachineSignals, track: MeasuredTrack, table: Table) -> MeasuredTrack | None:
-    """Return the track with one step of a clock taken out, None where there is none."""
-    seen = _seen(machine, track, table)
-    step = None if seen is None else clock_step(*seen, OWN_CLOCK_GAIN)
-    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * _longest_period_s(machine, track))
-    if step is None or abs(step.seconds) <= max(least, 3.0 * step.sigma):
-        return None
+def _followed(track: MeasuredTrack, step: ClockStep, began_ns: int) -> MeasuredTrack:
+    """Return the track with one step of a clock taken out, in a session that began then [ns]."""
     later = track.time_ns > step.end_ns
     shift_ns = np.where(later, round(step.seconds * NANOSECONDS), 0)
-    began = min(machine.angles.time_ns[0], track.time_ns[0])
     around = ~later & (track.time_ns >= step.begin_ns)
     mended = replace(track, time_ns=track.time_ns - shift_ns).take(~around)
     return mended.take(last_of_equal(mended.time_ns)).with_remark(
         f"the clock of the pose sensor steps by {step.seconds:+.3f} s (uncertain by "
         f"{step.sigma:.3f} s) against that of the joint states, "
-        f"{(step.begin_ns - began) / NANOSECONDS:.1f} s after the start: taken out; {around.sum()} "
-        "poses around it are not used"
+        f"{(step.begin_ns - began_ns) / NANOSECONDS:.1f} s after the start: taken out; "
+        f"{around.sum()} poses around it are not used"
     )
 
 
-def _seen(
-    machine: MachineSignals, track: MeasuredTrack, table: Table
-) -> tuple[Stamps, Array, Signal] | None:
-    """Return stamps and rotations that were measured, and the rigid ones; None without any."""
-    known = np.isfinite(track.rotation).all(axis=(1, 2))
-    every = max(1, len(machine.angles) // ANGLES_USED)
-    theta, time_ns = machine.angles.values[::every], machine.angles.time_ns[::every]
-    reachable = table.mechanism.reachable(theta)
-    if not known.any() or not reachable.any():
-        return None
-    rigid = Rotation.from_matrix(rigid_rotation(table, theta[reachable])).as_quat()
-    return track.time_ns[known], track.rotation[known], Signal(time_ns[reachable], rigid)
-
-
-def _offset(machine: MachineSignals, track: MeasuredTrack, table: Table) -> ClockOffset | None:
-    seen = _seen(machine, track, table)
-    return None if seen is None else clock_offset(*seen)
-
-
-def _another_clock(offset: ClockOffset, machine: MachineSignals, track: MeasuredTrack) -> bool:
+def _is_of_clocks(
+    offset: ClockOffset | ClockStep, machine: MachineSignals, track: MeasuredTrack
+) -> bool:
     """Tell whether an offset is one of clocks, not a delay that the wrist's model can have."""
-    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * _longest_period_s(machine, track))
-    least = max(least, 3.0 * offset.sigma)
-    return abs(offset.seconds) > least and offset.gain > OWN_CLOCK_GAIN
-
-
-def _rigid_when_measured(
-    machine: MachineSignals, time_ns: Stamps, late: ClockOffset | None, table: Table, rigid: Array
-) -> Array:
-    """Return the rigid rotations at the moments of the poses, not at their late stamps."""
-    if late is None or abs(late.seconds) <= 3.0 * late.sigma:
-        return rigid
-    theta = _angles(machine, _moments(time_ns, late))
-    reachable = table.mechanism.reachable(theta)
-    meant = rigid.copy()
-    meant[reachable] = rigid_rotation(table, theta[reachable])
-    return meant
-
-
-def _moments(time_ns: Stamps, late: ClockOffset | None) -> Stamps:
-    """Return when poses were measured whose stamps are late, by the joint states' clock [ns]."""
-    return time_ns if late is None else time_ns - round(late.seconds * NANOSECONDS)
-
-
-def _angles(machine: MachineSignals, time_ns: Stamps) -> Array:
-    """Return the motor angles (n, 2) at any stamps [rad]: outside of theirs those at the end."""
-    own = machine.angles.time_ns
-    return machine.angles.interpolated(np.clip(time_ns, own[0], own[-1]))
-
-
-def _longest_period_s(machine: MachineSignals, track: MeasuredTrack) -> float:
-    """Return the longer one of the sample periods of angles and poses [s]."""
     periods = (np.diff(each) for each in (machine.angles.time_ns, track.time_ns) if len(each) > 1)
-    return max((float(np.median(each)) / NANOSECONDS for each in periods), default=0.0)
+    longest = max((float(np.median(each)) / NANOSECONDS for each in periods), default=0.0)
+    least = max(OWN_CLOCK_S, OWN_CLOCK_PERIODS * longest, CERTAIN * offset.sigma)
+    return abs(offset.seconds) > least
+
+
+def _rigid_at(machine: MachineSignals, time_ns: Stamps, late_s: float, table: Table) -> Array:
+    """Return the rigid rotations (n, 3, 3) so long before stamps (n,) [ns]; NaN out of reach.
+
+    Outside of the joint states the motors are where they are at the ends.
+    """
+    own = machine.angles.time_ns
+    moments = np.clip(time_ns - round(late_s * NANOSECONDS), own[0], own[-1])
+    theta = machine.angles.interpolated(moments)
+    rigid, reachable = np.full((len(theta), 3, 3), np.nan), table.mechanism.reachable(theta)
+    rigid[reachable] = rigid_rotation(table, theta[reachable])
+    return rigid
 
 
 def _another_geometry(notes: Mapping[str, Any], table: Table) -> list[str]:
