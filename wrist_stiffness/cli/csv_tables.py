@@ -113,7 +113,6 @@ def export(arguments: argparse.Namespace) -> int:
         table_named(arguments),
         remaps=named.topics,
         settings=named.settings,
-        overwrite=arguments.overwrite,
         progress=Progress("rows"),
     )
     turns = f", {found.turns} rows of the way between them" if found.turns else ""
