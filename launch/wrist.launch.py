@@ -29,11 +29,10 @@ def start(context: LaunchContext) -> list[LogInfo | Node]:
     nodes = [
         Node(
             package="wrist_stiffness",
-            executable=entry.executable,
+            executable=entry.name,
             name=entry.name,
             namespace=given["namespace"],
             parameters=[*([CELL_PARAMETERS] if cell else []), entry.parameters, *parameters],
-            remappings=list(entry.remappings),
             respawn=truth("respawn", given["respawn"]),
             respawn_delay=1.0,
         )

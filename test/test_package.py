@@ -87,7 +87,7 @@ def test_every_console_script_names_a_function_that_exists(source):
     scripts.read(source / "wrist_stiffness.egg-info/entry_points.txt")
     assert set(scripts["console_scripts"]) == {
         "wrist-stiffness",
-        *(entry.executable for entry in (*WRIST_NODES, SIMULATOR_NODE)),
+        *(entry.name for entry in (*WRIST_NODES, SIMULATOR_NODE)),
     }
     for target in scripts["console_scripts"].values():
         module, function = target.split(":")
@@ -135,7 +135,7 @@ def test_pip_installs_commands_and_shipped_files(source, tmp_path):
     run(*pip, *options, "--prefix", tmp_path, source, cwd="/")
     assert {path.name for path in (tmp_path / "bin").iterdir()} == {
         "wrist-stiffness",
-        *(entry.executable for entry in (*WRIST_NODES, SIMULATOR_NODE)),
+        *(entry.name for entry in (*WRIST_NODES, SIMULATOR_NODE)),
     }
     (site,) = tmp_path.glob("lib/python*/site-packages")
     assert modules(site / "wrist_stiffness") == modules(source / "wrist_stiffness")
@@ -161,7 +161,7 @@ def test_colcon_installs_executables_and_shipped_files(source, tmp_path, options
     prefix = tmp_path / "install/wrist_stiffness"
     assert {path.name for path in (prefix / "lib/wrist_stiffness").iterdir()} == {
         "wrist-stiffness",
-        *(entry.executable for entry in (*WRIST_NODES, SIMULATOR_NODE)),
+        *(entry.name for entry in (*WRIST_NODES, SIMULATOR_NODE)),
     }
     share = prefix / "share"
     assert (share / "ament_index/resource_index/packages/wrist_stiffness").is_file()
@@ -199,14 +199,12 @@ def test_launch_file_starts_the_node_list():
 
 def test_node_entry_becomes_a_command():
     entry = NodeEntry(
-        executable="angle_corrector",
-        name="left",
+        name="angle_corrector",
         parameters={"enabled_on_start": True, "rate_hz": 1.5},
-        remappings=(("/motor_commands", "/left/motor_commands"),),
     )
     python, *rest = entry.command()
     assert python == sys.executable
     assert " ".join(rest) == (
-        "-m wrist_stiffness.ros.start angle_corrector --ros-args -r __node:=left "
-        "-p enabled_on_start:=true -p rate_hz:=1.5 -r /motor_commands:=/left/motor_commands"
+        "-m wrist_stiffness.ros.start angle_corrector --ros-args -r __node:=angle_corrector "
+        "-p enabled_on_start:=true -p rate_hz:=1.5"
     )

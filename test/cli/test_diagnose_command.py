@@ -49,4 +49,4 @@ def test_a_recording_that_is_not_there_is_one_line(capsys, tmp_path):
 
 def test_a_report_on_many_wrists_is_refused_before_any_work(refused):
     wrong = refused("diagnose", "monday.mcap", "--each", "--report", "x.html")
-    assert "--report draws one wrist" in wrong
+    assert "argument --report: not allowed with argument --each" in wrong

@@ -220,7 +220,6 @@ def test_a_fleet_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys)
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (["--each", "--report", "x.html"], "--report draws one wrist"),
         (["--model", "missing.yaml"], "missing.yaml"),
         (["--report", "no folder/x.html"], "no folder/x.html: folder no folder does not exist"),
         (["--json", "."], ".: cannot be written: it is a folder"),

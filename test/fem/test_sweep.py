@@ -95,7 +95,7 @@ def test_a_cut_part_is_condensed_again(values, table, store):
 def test_rebuild_gives_the_same_numbers(table, tmp_path, monkeypatch):
     path = tmp_path / "t.npz"
     save_table(table, path)
-    findings = check(path, rebuild=True)
+    findings = list(check(path, rebuild=True))
     assert all(finding.passed for finding in findings), findings
     assert {"rebuilt operators", "rebuilt map_values"} <= {finding.name for finding in findings}
     other = replace(table, operators=table.operators * (1.0 + 1e-5))
@@ -119,7 +119,7 @@ def test_check_knows_another_geometry(table, tmp_path, values):
     save_table(table, tmp_path / "t.npz")
     other = {**values, "name": "another wrist"}
     (tmp_path / "g.yaml").write_text(yaml.safe_dump(other))
-    findings = check(tmp_path / "t.npz", tmp_path / "g.yaml")
+    findings = list(check(tmp_path / "t.npz", tmp_path / "g.yaml"))
     assert [finding.name for finding in findings if not finding.passed] == ["geometry"]
 
 

@@ -277,14 +277,14 @@ def test_spreadsheets_marks_and_blank_lines_do_no_harm(tmp_path):
     assert import_csv(path, tmp_path / "bag").rows == 6
 
 
-def test_nothing_is_overwritten_unasked(tmp_path, full, table):
+def test_nothing_is_overwritten_unasked(tmp_path, full, capsys):
     import_csv(full, tmp_path / "bag")
     with pytest.raises(RecordingError, match="not overwritten"):
         import_csv(full, tmp_path / "bag")
-    with pytest.raises(InputError, match="not overwritten"):
-        export_csv(tmp_path / "bag", full, table)
-    before = full.read_bytes()
-    export_csv(tmp_path / "bag", full, table, overwrite=True)
+    export, before = ["export", str(tmp_path / "bag"), "-o", str(full)], full.read_bytes()
+    assert main(export) == 2
+    assert "not overwritten" in capsys.readouterr().err
+    assert main([*export, "--overwrite"]) == 0
     assert full.read_bytes() == before
 
 
@@ -300,7 +300,7 @@ def test_an_export_never_replaces_its_own_recording(tmp_path, full, table, name,
     recording = (tmp_path / "run.mcap").rename(tmp_path / name)
     before = recording.read_bytes()
     with pytest.raises(InputError, match=reason):
-        export_csv(recording, recording, table, overwrite=True)
+        export_csv(recording, recording, table)
     assert recording.read_bytes() == before
 
 
@@ -309,7 +309,7 @@ def test_an_export_that_cannot_be_written_leaves_nothing(tmp_path, full, table):
     with pytest.raises(WristError, match="cannot be written"):
         export_csv(tmp_path / "bag", tmp_path / "no folder" / "out.csv", table)
     with pytest.raises(WristError, match="cannot be written"):
-        export_csv(tmp_path / "bag", tmp_path, table, overwrite=True)
+        export_csv(tmp_path / "bag", tmp_path, table)
 
 
 @pytest.mark.parametrize("separator", [";", "\t"])

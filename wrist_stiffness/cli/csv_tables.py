@@ -6,9 +6,8 @@ import argparse
 from dataclasses import asdict
 
 from wrist_stiffness.cli.options import RECORDING, SENSOR_NAMES, recordings_named, table_named
-from wrist_stiffness.cli.parser import command, flag, option, output, say
+from wrist_stiffness.cli.parser import command, flag, one_of, option, output, say
 from wrist_stiffness.cli.progress import Progress
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.topics import BASE_FRAME, INSTRUMENT_FRAME
 
 LONG_DAYS = 1.0
@@ -19,11 +18,13 @@ LONG_DAYS = 1.0
     option("table", "UTF-8; commas, semicolons or tabs between columns", "FILE.csv"),
     output("RECORDING", "folder or .mcap file"),
     flag("--unloaded", "there are no load columns because nothing pulled at the platform"),
-    flag("--register", "the instrument stands anywhere: the wrist's motion will tell where"),
-    option(
-        "--gauges",
-        "which columns are dial gauges or inclinometers, with their points and directions",
-        "FILE.yaml",
+    one_of(
+        flag("--register", "the instrument stands anywhere: the wrist's motion will tell where"),
+        option(
+            "--gauges",
+            "which columns are dial gauges or inclinometers, with their points and directions",
+            "FILE.yaml",
+        ),
     ),
     flag("--overwrite", "replace an existing recording"),
 )
@@ -59,8 +60,6 @@ def import_(arguments: argparse.Namespace) -> int:
     """
     from wrist_stiffness.commands.import_csv import import_csv
 
-    if arguments.register and arguments.gauges:
-        raise InputError("--register belongs to poses: where gauges stand, says --gauges")
     found = import_csv(
         arguments.table,
         arguments.output,
@@ -113,7 +112,6 @@ def export(arguments: argparse.Namespace) -> int:
         table_named(arguments),
         remaps=named.topics,
         settings=named.settings,
-        overwrite=arguments.overwrite,
         progress=Progress("rows"),
     )
     turns = f", {found.turns} rows of the way between them" if found.turns else ""

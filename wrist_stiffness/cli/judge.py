@@ -8,7 +8,6 @@ from functools import partial
 from wrist_stiffness.cli.options import JUDGING, MODEL_OPTION, model_named, recordings_named
 from wrist_stiffness.cli.parser import command, flag, option, repeated, say, this_run, value
 from wrist_stiffness.cli.progress import Progress, Status
-from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
 
 
@@ -39,7 +38,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
     models = arguments.model or [shipped_file("config/palmieri2015_model.yaml")]
     recordings = recordings_named(arguments.recordings, arguments)
-    if _for_each(arguments):
+    if arguments.each:
         from wrist_stiffness.commands.fleet import each_recording, table_values
         from wrist_stiffness.report.fleet_lines import compared_lines
 
@@ -95,7 +94,7 @@ def diagnose(arguments: argparse.Namespace) -> int:
     require_limits(naming, seconds)
     model = model_named(arguments)
     recordings = recordings_named(arguments.recordings, arguments)
-    if _for_each(arguments):
+    if arguments.each:
         from wrist_stiffness.commands.fleet import each_recording, table_values
         from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
@@ -114,10 +113,3 @@ def diagnose(arguments: argparse.Namespace) -> int:
 
         write_page(arguments.report, report_of_diagnosis(found))
     return code
-
-
-def _for_each(arguments: argparse.Namespace) -> bool:
-    """Tell whether every recording is taken by itself (InputError beside `--report`)."""
-    if arguments.each and arguments.report:
-        raise InputError("--report draws one wrist; leave out --each")
-    return bool(arguments.each)

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wrist_stiffness.cli.parser import Option, flag, option, output, repeated
+from wrist_stiffness.cli.parser import Option, flag, one_of, option, output, repeated
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
 
@@ -62,8 +62,10 @@ SENSOR_NAMES = sensor_names()
 
 JUDGING = (
     option("recordings", "recording, or folder of recordings", "RECORDING", nargs="+"),
-    option("--report", "write a report with pictures here", "OUT.html"),
-    flag("--each", "every recording is of a wrist of its own: one line for each, in parallel"),
+    one_of(
+        option("--report", "write a report with pictures here", "OUT.html"),
+        flag("--each", "every recording is of a wrist of its own: one line for each, in parallel"),
+    ),
     *SENSOR_NAMES,
 )
 """The recordings that a model is judged by, of one wrist or (`--each`) of many."""

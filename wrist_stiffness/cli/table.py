@@ -130,7 +130,7 @@ def check(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.commands.table import check
 
     path = arguments.table or shipped_file("precomputed/palmieri2015.npz")
-    findings = check(path, arguments.geometry, arguments.rebuild, Progress("rebuild"))
+    findings = list(check(path, arguments.geometry, arguments.rebuild, Progress("rebuild")))
     passed = all(finding.passed for finding in findings)
     lines = [f"{'good' if each.passed else 'BAD ':4} {each.name}: {each.text}" for each in findings]
     lines.append(f"{path}: {'good' if passed else 'NOT good'}")

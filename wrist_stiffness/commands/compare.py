@@ -30,32 +30,14 @@ class Compared:
 
     comparison: Comparison
     border: Array  # (b, 2), motor angles on the border of the operative workspace [rad]
-    remarks: tuple[str, ...]  # what could not be used of the recordings
+    notes: tuple[str, ...]  # what a reader must know of the numbers
     damage: tuple[str, ...]  # those of them on recordings that are cut or damaged
-    fitted_here: tuple[str, ...]  # models that were fitted to one of these very recordings
-    as_drawn: bool  # whether the last model was never fitted to any recording
     provenance: Provenance
 
     def worst(self, model: ComparedModel) -> tuple[WorstPose, ...]:
         """Return the poses at which a model fails worst."""
         found = self.comparison
         return worst_poses(model.refitted, found.noise, found.sessions)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a reader must know of the numbers."""
-        fitted = tuple(
-            f"{name} was fitted to one of these recordings: its error here flatters it"
-            for name in self.fitted_here
-        )
-        last, found = self.comparison.models[-1], self.comparison
-        if not self.as_drawn or found.over_noise(last) < WORTH_ASKING:
-            return (*self.remarks, *fitted)
-        drawn = (
-            f"{last.name} was never fitted to a wrist, and each is built a little off its drawing: "
-            "calibrate first, then compare again"
-        )
-        return (*self.remarks, *fitted, drawn)
 
     def levels(self) -> list[tuple[str, dict[str, float]]]:
         """Return what the errors are to be compared with, by name."""
@@ -103,15 +85,25 @@ def compare(
     sessions = read_sessions(recordings, [model for _, model in loaded], progress("reading"))
     comparison = compare_models(loaded, list(sessions.values()), progress("comparing"))
     hashes = sha256_by_name(sessions)
-    fitted_here = tuple(name for name, model in loaded if was_fitted_to(model, sessions))
+    notes = [
+        *remarks_of(sessions.values()),
+        *(
+            f"{name} was fitted to one of these recordings: its error here flatters it"
+            for name, model in loaded
+            if was_fitted_to(model, sessions)
+        ),
+    ]
+    if not loaded[-1][1].lineage and comparison.over_noise(comparison.models[-1]) >= WORTH_ASKING:
+        notes.append(
+            f"{names[-1]} was never fitted to a wrist, and each is built a little off its drawing: "
+            "calibrate first, then compare again"
+        )
     files = {name: file_sha256(path) for name, path in zip(names, models, strict=True)}
     return Compared(
         comparison,
         table.workspace.operative_border,
-        remarks_of(sessions.values()),
+        tuple(notes),
         tuple(f"{each.name}: {each.damage}" for each in sessions.values() if each.damage),
-        fitted_here,
-        not loaded[-1][1].lineage,
         Provenance(run.command, run.date, files, hashes),
     )
 

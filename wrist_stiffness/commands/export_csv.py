@@ -63,7 +63,6 @@ def export_csv(
     *,
     remaps: Mapping[str, str] | None = None,
     settings: StreamSettings | None = None,
-    overwrite: bool = False,
     progress: Progress = silent,
 ) -> Exported:
     """Write the measured poses of a recording with the signals that belong to them as a table.
@@ -75,12 +74,12 @@ def export_csv(
     `table`: of the wrist: turns loads that are measured on the platform into F, and knows how small
     a swing of a motor is the chatter of a count; `remaps`: actual by standard topic name;
     `settings`: joint names, sensor frames and age limit of loads; `progress`: told rows done and in
-    all.  Raises `InputError` if the output exists, is no table, or cannot be written; `WristError`
-    if the recording cannot be read, lacks a topic or has a frame that is not known.
+    all.  Raises `InputError` if the output is something else than a table, or cannot be written;
+    `WristError` if the recording cannot be read, lacks a topic or has a frame that is not known.
     """
     settings = settings or StreamSettings()
     output = Path(output)
-    _require_place(output, overwrite)
+    _require_place(output)
     source, samples, known = opened(recording, remaps or {}, settings)
     notes, _ = notes_of(samples)
     try:
@@ -135,16 +134,12 @@ def export_csv(
     return Exported(output, len(pose_ns), len(time_ns) - len(pose_ns), remarks)
 
 
-def _require_place(output: Path, overwrite: bool) -> None:
-    """Refuse to replace unasked, or what is no table: the recording itself, a model."""
+def _require_place(output: Path) -> None:
+    """Refuse to replace what is no table: the recording itself, a model."""
     if output.suffix == ".mcap":
         raise InputError(f"{output}: a table is no recording; choose another name")
     if not output.is_file():
         return
-    if not overwrite:
-        raise InputError(
-            f"{output} exists already and is not overwritten; choose another name or remove it"
-        )
     try:
         with output.open("rb") as old:
             head = old.readline(LONGEST_HEAD)

@@ -67,10 +67,7 @@ class FormulaEffect:
                 f"{self.id}: the formula {self.expression!r} has no parameter to fit; multiply it "
                 "by one, 'size_um * ...'"
             )
-        try:
-            direction = np.array(self.direction, dtype=float)
-        except ValueError:
-            raise InputError(f"{self.id}: not six numbers in each direction") from None
+        direction = np.array(self.direction, dtype=float)
         law = FormulaLaw(self.id, self.component, direction, self.expression, used, keys)
         estimates = {key: Estimate(self.start.get(key, 1.0)) for key in keys}
         return Effect(law, self.component, estimates)

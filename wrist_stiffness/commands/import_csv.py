@@ -46,7 +46,7 @@ HUGE = 1e6
 TIME_ZERO_NS = 1_700_000_000_000_000_000
 """Stamp of time zero where a table counts from its own start: a stamp of zero says 'no stamp'."""
 
-EPOCH_FROM_S = 1_000_000_000
+EPOCH_FROM_NS = 1_000_000_000_000_000_000
 """Times from here on (September 2001) are taken as stamps since 1970."""
 
 LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
@@ -102,23 +102,21 @@ def import_csv(
         columns = _columns(form.header, unloaded, tuple(gauges))
     except InputError as error:
         raise InputError(f"{table}: {error}") from error
-    rows = measured = zero_ns = first_ns = stamp_ns = 0
+    rows = measured = first_ns = last_ns = 0
     with RecordingWriter(output, overwrite=overwrite) as writer:
         for row in _rows(table, form, columns):
             if rows == 0:
-                zero_ns = _zero(row.time_ns)
-                facts: dict[str, Any] = {"table": table.name, "time_zero_ns": zero_ns}
+                facts: dict[str, Any] = {"table": table.name, "time_zero_ns": row.zero_ns}
                 if gauges:
                     facts[GAUGES] = [each.note for each in gauges.values()]
                 if unloaded:
                     facts["load_source"] = "constant"
                 note = msg.String(json.dumps(facts, sort_keys=True))
-                first_ns = zero_ns + row.time_ns
+                first_ns = row.stamp_ns
                 writer.write(topics.RECORDING_NOTES, note, first_ns)
-            stamp_ns = zero_ns + row.time_ns
-            for topic, message in _messages(row, columns, stamp_ns, frame):
-                writer.write(topic, message, stamp_ns)
-            rows += 1
+            for topic, message in _messages(row, columns, frame):
+                writer.write(topic, message, row.stamp_ns)
+            rows, last_ns = rows + 1, row.stamp_ns
             measured += row.is_measured(columns)
             if rows % ROWS_A_REPORT == 0:
                 progress(rows, form.total)
@@ -131,7 +129,7 @@ def import_csv(
         Path(output),
         rows,
         measured,
-        1e-9 * (stamp_ns - first_ns),
+        1e-9 * (last_ns - first_ns),
         tuple(columns.temperatures),
         tuple(columns.covariates),
         form.cut_row,
@@ -150,9 +148,10 @@ class _Form:
 
 @dataclass(frozen=True)
 class _Row:
-    """Time [ns] of its own clock, and SI values by column; NaN where a cell is blank."""
+    """Its stamp and that of the table's time zero [ns], SI values by column without blank cells."""
 
-    time_ns: int
+    stamp_ns: int
+    zero_ns: int
     values: dict[str, float]
 
     def of(self, names: tuple[str, ...]) -> list[float]:
@@ -207,6 +206,21 @@ def _columns(header: list[str], unloaded: bool, gauges: tuple[str, ...]) -> Colu
     return columns
 
 
+def _cells(table: Path, form: _Form) -> Iterator[tuple[str, list[str]]]:
+    """Give the cells of each row that is whole and not blank, and where it is."""
+    with _opened(table) as stream:
+        lines = csv.reader(stream, delimiter=form.separator)
+        try:
+            next(lines)
+            for cells in lines:
+                if form.cut_row and lines.line_num >= form.cut_row:
+                    return
+                if any(cell.strip() for cell in cells):
+                    yield f"{table}: row {lines.line_num}", cells
+        except csv.Error as error:
+            raise InputError(f"{table}: row {lines.line_num}: {error}") from error
+
+
 def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
     """Read the rows one by one and check them."""
     header, mark = form.header, ""
@@ -215,61 +229,46 @@ def _rows(table: Path, form: _Form, columns: Columns) -> Iterator[_Row]:
     required = {*MOTORS, *(LOAD if columns.loads else ())}
     before: tuple[int, str] | None = None
     zero_ns = 0
-    with _opened(table) as stream:
-        lines = csv.reader(stream, delimiter=form.separator)
-        next(lines)
-        while (cells := _next(lines, table)) is not None:
-            place = f"{table}: row {lines.line_num}"
-            if form.cut_row and lines.line_num >= form.cut_row:
-                return
-            if not any(cell.strip() for cell in cells):
-                continue
-            if len(cells) != len(header):
-                decimal = len(cells) > len(header) and form.separator == ","
-                why = "; decimal commas need semicolons or tabs between columns" if decimal else ""
-                raise InputError(f"{place}: {len(cells)} cells for {len(header)} columns{why}")
-            written = dict(zip(header, cells, strict=True))
-            text = {name: _blank_if_nan(cell) for name, cell in written.items()}
-            if form.separator != ",":
-                mark = _with_points(place, text, mark)
-            try:
-                time_ns = nanoseconds(text[TIME])
-            except ValueError as error:
-                raise InputError(f"{place}, column {TIME}: {error}") from error
-            if before is not None and time_ns <= before[0]:
-                raise InputError(
-                    f"{place}, column {TIME}: {text[TIME]} is not later than {before[1]} of the "
-                    "row before"
-                )
-            if before is None:
-                zero_ns = _zero(time_ns)
-            if not 0 <= zero_ns + time_ns <= LAST_STAMP_NS:
-                raise InputError(
-                    f"{place}, column {TIME}: {text[TIME]} s is a stamp outside 0 to "
-                    f"{LAST_STAMP_NS / 1e9:.0f} s since 1970"
-                )
-            before = time_ns, text[TIME]
-            values = {}
-            for name, read in readers.items():
-                if not text[name].strip():
-                    if name in required:
-                        raise InputError(_missing(place, name, written[name]))
-                    continue
+    for place, cells in _cells(table, form):
+        if len(cells) != len(header):
+            decimal = len(cells) > len(header) and form.separator == ","
+            why = "; decimal commas need semicolons or tabs between columns" if decimal else ""
+            raise InputError(f"{place}: {len(cells)} cells for {len(header)} columns{why}")
+        written = dict(zip(header, cells, strict=True))
+        text = {
+            name: "" if cell.strip().lower() == "nan" else cell for name, cell in written.items()
+        }
+        if form.separator != ",":
+            mark = _with_points(place, text, mark)
+        try:
+            time_ns = nanoseconds(text[TIME])
+        except ValueError as error:
+            raise InputError(f"{place}, column {TIME}: {error}") from error
+        if before is None:
+            zero_ns = 0 if time_ns >= EPOCH_FROM_NS else TIME_ZERO_NS
+        elif time_ns <= before[0]:
+            raise InputError(
+                f"{place}, column {TIME}: {text[TIME]} is not later than {before[1]} of the row "
+                "before"
+            )
+        if not 0 <= zero_ns + time_ns <= LAST_STAMP_NS:
+            raise InputError(
+                f"{place}, column {TIME}: {text[TIME]} s is a stamp outside 0 to "
+                f"{LAST_STAMP_NS / 1e9:.0f} s since 1970"
+            )
+        before = time_ns, text[TIME]
+        values = {}
+        for name, read in readers.items():
+            if text[name].strip():
                 try:
                     values[name] = read(text[name])
                 except ValueError as error:
                     raise InputError(f"{place}, column {name}: {error}") from error
-            yield _checked(place, _Row(time_ns, values))
-
-
-def _blank_if_nan(cell: str) -> str:
-    return "" if cell.strip().lower() == "nan" else cell
-
-
-def _missing(place: str, name: str, cell: str) -> str:
-    is_what = "is NaN" if cell.strip() else "is blank"
-    why = "angles and loads must be in every line; delete the line"
-    return f"{place}, column {name} {is_what}: {why}"
+            elif name in required:
+                is_what = "is NaN" if written[name].strip() else "is blank"
+                why = "angles and loads must be in every line; delete the line"
+                raise InputError(f"{place}, column {name} {is_what}: {why}")
+        yield _checked(place, _Row(zero_ns + time_ns, zero_ns, values))
 
 
 def _with_points(place: str, text: dict[str, str], mark: str) -> str:
@@ -289,13 +288,6 @@ def _with_points(place: str, text: dict[str, str], mark: str) -> str:
     return mark
 
 
-def _next(lines: Any, table: Path) -> list[str] | None:
-    try:
-        return next(lines, None)
-    except csv.Error as error:
-        raise InputError(f"{table}: row {lines.line_num}: {error}") from error
-
-
 def _checked(place: str, row: _Row) -> _Row:
     """Refuse a quaternion that is none."""
     quaternion = row.of(QUATERNION)
@@ -308,14 +300,9 @@ def _checked(place: str, row: _Row) -> _Row:
     return row
 
 
-def _zero(time_ns: int) -> int:
-    return 0 if time_ns >= EPOCH_FROM_S * 1_000_000_000 else TIME_ZERO_NS
-
-
-def _messages(
-    row: _Row, columns: Columns, stamp_ns: int, frame: str
-) -> Iterator[tuple[str, msg.Message]]:
+def _messages(row: _Row, columns: Columns, frame: str) -> Iterator[tuple[str, msg.Message]]:
     """Give the messages of a row; the load goes first, so that it has arrived with its angles."""
+    stamp_ns = row.stamp_ns
     header = msg.Header(stamp_ns, BASE_FRAME)
     load = row.of(LOAD) if columns.loads else [0.0] * 6
     wrench = msg.Wrench(msg.Vector3(*load[:3]), msg.Vector3(*load[3:]))

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.commands.budget import Push
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.configuration import Configuration
 from wrist_stiffness.mechanism.modes import NaturalModes, RigidBody, natural_modes, plate
-from wrist_stiffness.mechanism.vectors import cross
 
 PER_AXIS = 31
 """Grid of the map; a pose costs some 5 ms for each state of the flanges."""
@@ -55,10 +55,6 @@ class ModeMap:
     # domain
     frequency: dict[str, Array]
 
-    def operative(self, table: Table, state: str) -> Array:
-        """Frequencies in the operative workspace (k, 6) [Hz]."""
-        return self.frequency[state][table.workspace.operative(self.poses)]
-
 
 def mode_map(table: Table, payload: RigidBody | None = None) -> ModeMap:
     """Solve for the natural modes on a grid over the map domain.
@@ -79,12 +75,12 @@ def mode_map(table: Table, payload: RigidBody | None = None) -> ModeMap:
 
 def summarise(table: Table, found: ModeMap) -> ModeSummary:
     """Return frequencies [Hz] in the operative workspace by state of the flanges."""
+    inside = table.workspace.operative(found.poses)
     return {
         state: {
-            name: getattr(found.operative(table, state), name)(axis=0).tolist()
-            for name in ("min", "mean", "max")
+            name: getattr(values[inside], name)(axis=0).tolist() for name in ("min", "mean", "max")
         }
-        for state in STATES
+        for state, values in found.frequency.items()
     }
 
 
@@ -106,9 +102,8 @@ def _touching(
         return np.full((poses, sectors), state == "closed")
     wrench = np.zeros((poses, 6))
     if payload is not None:
-        weight = np.broadcast_to(payload.mass * table.geometry.gravity, (poses, 3))
-        place = configuration.platform @ payload.centre
-        wrench = np.concatenate([weight, cross(place, weight)], axis=-1)
+        weight = Push(payload.mass * table.geometry.gravity, np.zeros(3), payload.centre)
+        wrench = weight.wrench(configuration.platform)
         for each in wrench:
             table.check_load(each)
     return respond(table.operators_at(configuration, "closed_form"), wrench).active

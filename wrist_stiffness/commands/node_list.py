@@ -27,10 +27,8 @@ PARENT_PID = "WRIST_STIFFNESS_PARENT"
 class NodeEntry:
     """One node to start."""
 
-    executable: str  # name of the executable and of the module in `wrist_stiffness.ros`
-    name: str
+    name: str  # of the node, of its executable and of the module in `wrist_stiffness.ros`
     parameters: dict[str, ParameterValue] = field(default_factory=dict)  # values by parameter name
-    remappings: tuple[tuple[str, str], ...] = ()  # (standard, actual) topic names
 
     def having(self, parameters: Mapping[str, ParameterValue]) -> NodeEntry:
         """Return the same entry with further parameters."""
@@ -38,13 +36,11 @@ class NodeEntry:
 
     def command(self) -> list[str]:
         """Return the process arguments that start this node with the running interpreter."""
-        arguments = [sys.executable, "-m", "wrist_stiffness.ros.start", self.executable]
+        arguments = [sys.executable, "-m", "wrist_stiffness.ros.start", self.name]
         arguments += ["--ros-args", "-r", f"__node:={self.name}"]
         for parameter, value in self.parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value) or "''"
             arguments += ["-p", f"{parameter}:={text}"]
-        for standard, actual in self.remappings:
-            arguments += ["-r", f"{standard}:={actual}"]
         return arguments
 
 
@@ -91,13 +87,12 @@ def unknown_arguments(given: Iterable[str]) -> list[str]:
 
 
 WRIST_NODES = tuple(
-    NodeEntry(executable=name, name=name)
-    for name in ("pose_error_predictor", "angle_corrector", "model_monitor")
+    NodeEntry(name) for name in ("pose_error_predictor", "angle_corrector", "model_monitor")
 )
 """The nodes beside a real wrist."""
 
-SIMULATOR_NODE = NodeEntry(executable="cell_simulator", name="cell_simulator")
+SIMULATOR_NODE = NodeEntry("cell_simulator")
 """The virtual wrist, with its motors, load and pose sensor."""
 
-RECORDER_NODE = NodeEntry(executable="recorder", name="recorder")
+RECORDER_NODE = NodeEntry("recorder")
 """Writes the wrist's topics into a recording; `ros2 bag` does where ROS is installed."""

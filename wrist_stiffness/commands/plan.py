@@ -15,7 +15,7 @@ from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.planning.information import MeasurementNoise
 from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
-from wrist_stiffness.planning.question import Question, between, commissioning
+from wrist_stiffness.planning.question import between, commissioning
 from wrist_stiffness.planning.rivals import dwell_noise, read_rivals
 from wrist_stiffness.planning.timeline import Pace, Timeline, as_experiment
 from wrist_stiffness.progress import Progress, silent
@@ -76,7 +76,6 @@ class Planned:
     """A plan and what it is for."""
 
     model: ErrorModel
-    question: Question
     plan: Plan
 
     def as_values(self) -> dict[str, Any]:
@@ -139,7 +138,7 @@ def plan_experiment(
         None if options.minutes is None else 60.0 * options.minutes,
         options.seed,
     )
-    return Planned(model, question, plan(model, question, conditions, earlier, progress))
+    return Planned(model, plan(model, question, conditions, earlier, progress))
 
 
 def plan_rows(timeline: Timeline) -> list[dict[str, Any]]:

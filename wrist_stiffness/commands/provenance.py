@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +55,4 @@ class Provenance:
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read."""
-        return {
-            "command": self.command,
-            "date": self.date,
-            "models": dict(self.models),
-            "recordings": dict(self.recordings),
-            "versions": self.versions,
-        }
+        return {**asdict(self), "versions": self.versions}

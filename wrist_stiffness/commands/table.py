@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,38 +145,30 @@ def check(
     geometry: str | Path | None = None,
     rebuild: bool = False,
     progress: Progress = silent,
-) -> list[Finding]:
-    """Verify a table: all checks; the table is good if all passed.
+) -> Iterator[Finding]:
+    """Verify a table and give all checks; the table is good if all passed.
 
     `geometry`: file that the table must be of; `rebuild`: also condense the parts and sweep again,
     and compare all numbers.  Raises `TableError` or `GeometryError` if a file cannot be read at
     all.
     """
     table = load_table(path)
-    findings = [Finding("file", f"complete, checksum {table.checksum[:12]}", True)]
+    yield Finding("file", f"complete, checksum {table.checksum[:12]}", True)
     if geometry is not None:
         wanted = load_geometry(geometry).sha256
-        same = wanted == table.geometry.sha256
-        findings.append(
-            Finding(
-                "geometry",
-                f"made for {table.geometry.sha256[:12]}, {geometry} is {wanted[:12]}",
-                same,
-            )
-        )
-    findings.append(_definiteness(table))
+        text = f"made for {table.geometry.sha256[:12]}, {geometry} is {wanted[:12]}"
+        yield Finding("geometry", text, wanted == table.geometry.sha256)
+    yield _definiteness(table)
     misses, operative = spline_misses(table, np.random.default_rng())
     for region, rows in (("operative", misses[operative]), ("domain", misses)):
         for column, name in enumerate(HALVES):
             stated = table.header.errors["predicted"][region][name]
             covered = float(np.mean(rows[:, column] <= stated + STATED_ROUNDING))
-            findings.append(
-                Finding(
-                    f"spline {name} {region}",
-                    f"within the stated {100 * stated:.3f} % at {100 * covered:.0f} % of fresh "
-                    f"poses and loads (at least {100 * COVERED:.0f} %)",
-                    covered >= COVERED,
-                )
+            yield Finding(
+                f"spline {name} {region}",
+                f"within the stated {100 * stated:.3f} % at {100 * covered:.0f} % of fresh "
+                f"poses and loads (at least {100 * COVERED:.0f} %)",
+                covered >= COVERED,
             )
     if rebuild:
         # Only this needs the mesher.
@@ -201,14 +194,11 @@ def check(
             old, new = getattr(table, name), getattr(again, name)
             same_shape = old.shape == new.shape
             difference = np.max(np.abs(old - new) / sizes_of(old)) if same_shape else np.inf
-            findings.append(
-                Finding(
-                    f"rebuilt {name}",
-                    f"differs by {difference:.1e} of its size (limit {REBUILT_TOLERANCE:.0e})",
-                    bool(difference <= REBUILT_TOLERANCE),
-                )
+            yield Finding(
+                f"rebuilt {name}",
+                f"differs by {difference:.1e} of its size (limit {REBUILT_TOLERANCE:.0e})",
+                bool(difference <= REBUILT_TOLERANCE),
             )
-    return findings
 
 
 def _definiteness(table: Table) -> Finding:

@@ -232,10 +232,9 @@ def _wrists(
             gap["gap_um"] = gap.get("gap_um", 0.0) + float(shim)
         own = {effect.name: effect for effect in model.effects}
         for (law, place), changed in by_effect.items():
+            if (before := own.get(f"{law}@{place}")) is not None:
+                changed = {k: before.estimates[k].value + value for k, value in changed.items()}
             effect = effect_at(find_law(law), place, changed)
-            if (before := own.get(effect.name)) is not None:
-                moved = {k: before.estimates[k].value + value for k, value in changed.items()}
-                effect = effect_at(find_law(law), place, moved)
             own[effect.name] = effect
         yield list(own.values())
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from wrist_stiffness.identification.taken_up import TakenUp
-from wrist_stiffness.report.page import TITLES, Table, number
+from wrist_stiffness.report.page import Table, number, title
 
 USUAL = 1.0
 """Standard deviations of its prior within which a tolerance needs no line of its own."""
 
 
-def absorbed_table(absorbed: Sequence[TakenUp]) -> Table:
-    """Return what set-up and tolerances took up, the same for every report."""
-    quantities = list(absorbed[0].moved)
+def absorbed_table(absorbed: Sequence[TakenUp], keys: Iterable[str]) -> Table:
+    """Return what set-up and tolerances took up, the same for every report.
+
+    `keys`: of the quantities that were measured.
+    """
+    titles = {key.rpartition("_")[0]: title(key) for key in keys}
     rows = [
         (
             each.name,
-            *(number(each.moved[name]) for name in quantities),
+            *(number(each.moved[name]) for name in titles),
             f"{each.parameter} = {number(each.value)}" if each.parameter else "",
             f"{each.deviations:.1f}" if each.parameter else "-",
         )
@@ -27,10 +30,7 @@ def absorbed_table(absorbed: Sequence[TakenUp]) -> Table:
         "By how much set-up and tolerances moved the prediction (RMS), and the parameter that went "
         "furthest from its drawing, in standard deviations of its prior."
     )
-    titles = [
-        TITLES[next(key for key in TITLES if key.startswith(f"{name}_"))] for name in quantities
-    ]
-    return Table(caption, ("", *titles, "furthest", "deviations"), rows)
+    return Table(caption, ("", *titles.values(), "furthest", "deviations"), rows)
 
 
 def absorbed_lines(absorbed: Sequence[TakenUp]) -> list[str]:

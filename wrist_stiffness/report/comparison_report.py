@@ -9,7 +9,6 @@ import numpy as np
 
 from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.sentences import sentences
-from wrist_stiffness.inference import Quantity
 from wrist_stiffness.report.absorbed import absorbed_table
 from wrist_stiffness.report.page import (
     Bullets,
@@ -21,6 +20,7 @@ from wrist_stiffness.report.page import (
     lines_of,
     number,
     provenance_section,
+    title,
 )
 from wrist_stiffness.report.pictures.errors import (
     Bars,
@@ -71,9 +71,11 @@ def report_of_comparison(compared: Compared) -> Page:
     units = found.models[0].refitted.n_units
     sections = _sections(compared, found.models)
     sections["On what the error depends"] += _dependence(found.models)
+    keys = [q.key for q in found.quantities]
     absorbed: list[Part] = []
     for model in found.models:
-        absorbed += [f"What the refit took up for {model.name}:", absorbed_table(model.absorbed)]
+        taken = absorbed_table(model.absorbed, keys)
+        absorbed += [f"What the refit took up for {model.name}:", taken]
     sections["How far off"] = [_bars(compared), *sections["How far off"], *absorbed]
     # All models are drawn together, or the first and the last few.
     most = MOST_MAPPED
@@ -112,15 +114,11 @@ def _sections(compared: Compared, models: Sequence[ComparedModel]) -> dict[str, 
     }
 
 
-def _label(quantity: Quantity) -> str:
-    return f"{quantity.name} [{quantity.unit}]"
-
-
 def _bars(compared: Compared) -> Picture:
     found = compared.comparison
     bars = [
         Bars(
-            _label(q),
+            title(q.key),
             [model.name for model in found.models],
             [model.after[q.key].rms for model in found.models],
             [model.after[q.key].rms_uncertainty for model in found.models],
@@ -142,7 +140,7 @@ def _sizes(compared: Compared) -> Table:
     found = compared.comparison
     head = ["model", "registrations"]
     for q in found.quantities:
-        head += [f"{_label(q)} mean", "RMS", "max"]
+        head += [f"{title(q.key)} mean", "RMS", "max"]
     rows = []
     for model in found.models:
         for stage, sizes in (("as it stands", model.before), ("refitted", model.after)):
@@ -156,7 +154,7 @@ def _sizes(compared: Compared) -> Table:
 
 def _levels(compared: Compared) -> Table:
     found = compared.comparison
-    head = ["to compare with", *(f"{_label(q)} RMS" for q in found.quantities)]
+    head = ["to compare with", *(f"{title(q.key)} RMS" for q in found.quantities)]
     rows = [
         [name, *(number(level[q.key]) for q in found.quantities)]
         for name, level in compared.levels()
@@ -201,4 +199,4 @@ def _worst(compared: Compared, model: ComparedModel) -> Table:
         for pose in compared.worst(model)
     ]
     caption = f"Where {model.name} fails worst, the largest error over the noise first."
-    return Table(caption, [*head, *map(_label, quantities)], rows)
+    return Table(caption, [*head, *(title(q.key) for q in quantities)], rows)

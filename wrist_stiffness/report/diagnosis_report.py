@@ -15,7 +15,6 @@ from wrist_stiffness.inference.search import TIME_OVER
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.absorbed import absorbed_lines, absorbed_table
 from wrist_stiffness.report.page import (
-    TITLES,
     Bullets,
     Command,
     Page,
@@ -28,6 +27,7 @@ from wrist_stiffness.report.page import (
     number,
     plus_minus,
     provenance_section,
+    title,
 )
 from wrist_stiffness.report.pictures.errors import Bars, draw_against, draw_bars
 from wrist_stiffness.sessions.observing import without_mounting
@@ -87,7 +87,7 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
     remains: list[Part] = [*(rest_lines(result) or ["Nothing beyond the noise."])]
     remains += [Command(line) if line.startswith("wrist-stiffness ") else line for line in laws]
     taken = found.answer.absorbed
-    absorbed: list[Part] = [absorbed_table(taken)] if taken else []
+    absorbed: list[Part] = [absorbed_table(taken, result.noise)] if taken else []
     if found.remarks:
         absorbed += ["To be kept in mind:", Bullets(found.remarks)]
     whole: Sections = {
@@ -128,7 +128,7 @@ def _sections(
     keys = {**result.noise, **result.before}
     table = Table(
         f"RMS. Held out: {result.scope}; these rows hold the instrument's drift too.",
-        ["", *(TITLES[key] for key in keys)],
+        ["", *map(title, keys)],
         [[name, *(number(row.get(key, nan)) for key in keys)] for name, row in rows],
     )
     return {
@@ -181,7 +181,7 @@ def _numbers(finding: Finding) -> Table:
 def _fall(result: Diagnosis) -> Picture:
     bars = [
         Bars(
-            TITLES[key],
+            title(key),
             ["before", "with the findings"],
             [before, result.after[key]],
             [0.0, 0.0],

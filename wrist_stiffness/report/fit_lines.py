@@ -10,7 +10,7 @@ import numpy as np
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
 from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
-from wrist_stiffness.report.page import TITLES, Table, plus_minus
+from wrist_stiffness.report.page import Table, plus_minus, title
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def calibration_lines(found: Calibrated) -> list[str]:
     }
     if not result.refused:
         parts["of this wrist:"] = told_lines(each for each in parameters if each.session is None)
-    for title, part in parts.items():
-        lines += ["", title, *(part or ["  nothing identifiable"])]
+    for heading, part in parts.items():
+        lines += ["", heading, *(part or ["  nothing identifiable"])]
     checks = {
         each.effect.name: each.effect.law.check.replace("{place}", each.effect.component)
         for each in result.fit.problem.free
@@ -93,7 +93,7 @@ def _judged_lines(
         [name, *(f"{row[key]:.3f}" if key in row else "-" for key in fit.noise)]
         for name, row in {**rows, "noise and drift alone": fit.noise}.items()
     ]
-    table = Table("", ["", *(TITLES.get(key, key) for key in fit.noise)], cells)
+    table = Table("", ["", *map(title, fit.noise)], cells)
     *_, after = rows.values()
     judged = f"judged {JUDGED_BY[judged_by]}"
     return [

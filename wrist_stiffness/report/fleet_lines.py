@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wrist_stiffness.comparing.wiring import LOOK_FIRST
-from wrist_stiffness.report.page import TITLES, Table
+from wrist_stiffness.report.page import Table, title
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.fleet import Row
@@ -72,7 +72,7 @@ def _table(rows: Rows, last: str, cells: Callable[[Values], list[str]], done: st
             lines.append([str(row.item), "", "", "", "", f"not {done}: {why}"])
         else:
             lines.append([str(row.item), *cells(row.result)])
-    sizes = [title for key in POSE for title in (TITLES[key], "noise")]
+    sizes = [text for key in POSE for text in (title(key), "noise")]
     table = Table("", ["recording", *sizes, last], lines)
     return table.lines()
 

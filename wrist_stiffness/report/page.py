@@ -53,14 +53,6 @@ NUMBER = re.compile(r"(\+-|[-+±])?\d[\d.,]*(e[-+]?\d+)?( (±|\+-) [\d.]+)?( %| 
 SIGNS = {r"\bum\b": "µm", r"\+-": "±", r"\bdegC\b": "°C", r" deg/s\b": " °/s"}
 """What texts have in ASCII, for terminals."""
 
-TITLES = {
-    "s_um": "s [um]",
-    "phi_mdeg": "phi [mdeg]",
-    "gauges_um": "gauges [um]",
-    "tilts_mdeg": "tilts [mdeg]",
-}
-"""Of columns, by the key of the quantity."""
-
 
 @dataclass(frozen=True)
 class Bullets:
@@ -215,6 +207,12 @@ def typeset(text: str) -> str:
     for plain, sign in SIGNS.items():
         text = re.sub(plain, sign, text)
     return text
+
+
+def title(key: str) -> str:
+    """Return the title of a column by the key of its quantity: of s_um it is s [um]."""
+    name, _, unit = key.rpartition("_")
+    return f"{name} [{unit}]"
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -173,7 +173,7 @@ def tolerance_lines(study: ToleranceStudy) -> list[str]:
     head = (
         "RMS beside the nominal model",
         "sigma",
-        *(page.TITLES[key] for key in study.whole.size),
+        *map(page.title, study.whole.size),
     )
     return [
         f"{study.model}: {study.wrists} virtual wrists at {study.poses} poses, load {load}",

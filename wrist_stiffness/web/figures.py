@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import View
+from wrist_stiffness.comparing.comparison import lengths
 from wrist_stiffness.comparing.curve import ANGLES, Curve, condition_label, condition_shown
 from wrist_stiffness.inference.observations import Mask, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
@@ -55,8 +56,8 @@ class Shown:
     """What every picture of a tab shows."""
 
     view: View  # of the version that is looked at
-    # (u, 6), what would be left with the chosen candidate, or what another version leaves [m, rad]
-    after: Array | None
+    # what would be left with the chosen candidate, or what another version leaves; None for neither
+    after: Observations | None
     name: str  # of that, empty for none
     quantity: Quantity  # shift or rotation
     axis: int  # component of it for pictures over time and condition
@@ -76,9 +77,13 @@ class Shown:
 
     def fall(self, quantity: Quantity, chosen: Mask | None = None) -> str:
         """Return what is left of a quantity in the chosen units, and after, RMS with the unit."""
-        left = [self.view.left.values, *([] if self.after is None else [self.after])]
-        sizes = " → ".join(number(rms(each, quantity, chosen)) for each in left)
-        return f"{sizes} {spelled(quantity.unit)}"
+        sizes = []
+        for left in (self.view.left, self.after):
+            if left is not None:
+                own = left if chosen is None else left.take(chosen)
+                error = own.rms(np.nan_to_num(own.values) ** 2)
+                sizes.append(number(error.get(quantity.key, np.nan)))
+        return f"{' → '.join(sizes)} {spelled(quantity.unit)}"
 
     def part(self, values: Array) -> Array:
         """Return the component that is shown of (u, m) values, in the unit of the quantity."""
@@ -103,21 +108,6 @@ def quantity_label(quantity: Quantity) -> str:
     return f"{WORDS.get(quantity.name, quantity.name)} [{spelled(quantity.unit)}]"
 
 
-def length(values: Array, quantity: Quantity) -> Array:
-    """Return the length of a quantity of (u, m) values, (u,) in its unit; NaN where unmeasured."""
-    own = values[:, list(quantity.components)] * quantity.per_si
-    size = np.sqrt(np.nansum(own**2, axis=1))
-    return np.where(np.isfinite(own).any(axis=1), size, np.nan)
-
-
-def rms(values: Array, quantity: Quantity, chosen: Mask | None = None) -> float:
-    """Return the root mean square of a quantity over the chosen units, or all."""
-    own = (values if chosen is None else values[chosen])[:, list(quantity.components)]
-    count = np.isfinite(own).sum(axis=0)
-    mean = np.nansum(own**2, axis=0) / np.maximum(count, 1)
-    return float(np.sqrt(mean.sum())) * quantity.per_si if count.any() else float("nan")
-
-
 def strongest(values: Array, quantity: Quantity) -> int:
     """Return the component of a quantity along which (u, m) values are largest."""
     return int(np.argmax(np.nansum(values[:, list(quantity.components)] ** 2, axis=0)))
@@ -137,7 +127,7 @@ def minutes(table: Observations) -> Array:
 def error_map(shown: Shown, border: Array) -> Figure:
     """Return the error over both motor angles, with the workspace's border (n, 2) [rad]."""
     table = shown.view.left
-    size = length(table.values if shown.after is None else shown.after, shown.quantity)
+    size = lengths(table if shown.after is None else shown.after, shown.quantity)
     one, two = (np.degrees(table.covariate(name)) for name in ANGLES)
     edge = np.degrees(border)
     points = _dots(one, two, "averaged poses", "", shown)
@@ -184,7 +174,7 @@ def time_line(shown: Shown) -> Figure:
         _dots(time, left, "left", BLUE, shown, 4) | LOWER,
     ]
     if shown.after is not None:
-        after = shown.part(shown.after)
+        after = shown.part(shown.after.values)
         told = over_time(view, predicted + left - after)
         traces.insert(2, _line(*told, shown.name, RED))
         traces.append(_dots(time, after, "left", RED, shown, 4) | LOWER)
@@ -214,7 +204,7 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
     values = condition_shown(table, condition) if told is None else told.values[:, 0]
     traces = [_dots(values, part(table.values), "remaining error", BLUE, shown)]
     if shown.after is not None:
-        traces.append(_dots(values, part(shown.after), shown.name, RED, shown))
+        traces.append(_dots(values, part(shown.after.values), shown.name, RED, shown))
     elif told is not None:
         traces = [_dots(values, told.measured, "remaining error", BLUE, shown)]
         traces.append(_line(told.places[:, 0], told.mean, "fitted law", RED))

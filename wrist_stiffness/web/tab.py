@@ -15,14 +15,14 @@ import numpy as np
 from nicegui import background_tasks, run, ui
 
 from wrist_stiffness.analysis import View
+from wrist_stiffness.comparing.comparison import lengths
 from wrist_stiffness.inference.answer import Diagnosis
-from wrist_stiffness.inference.observations import Mask, Quantity
+from wrist_stiffness.inference.observations import Mask, Observations, Quantity
 from wrist_stiffness.lookup.table import Table
-from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.sessions.contents import Contents
 from wrist_stiffness.web.bench import CANCELLED, Changes, Depends, Row, Seen, work
-from wrist_stiffness.web.figures import Shown, length, rms, strongest
+from wrist_stiffness.web.figures import Shown, strongest
 from wrist_stiffness.web.workspace import Workspace
 
 DEPENDS, VERSIONS = "Depends on", "Versions"
@@ -167,18 +167,19 @@ class Tab:
             self.table = load_model(self.model_path).table
             first = self.views[0]
             # Begin with the quantity that stands farthest above its noise, where it is worst.
-            over = [rms(first.left.values, q) / first.noise[q.key] for q in self.quantities]
+            errors = first.left.rms(np.nan_to_num(first.left.values) ** 2)
+            over = [errors[q.key] / first.noise[q.key] for q in self.quantities]
             self.quantity = int(np.nanargmax(over))
-            self.moment = self._worst(first.left.values)
+            self.moment = self._worst(first.left)
 
-    def _worst(self, left: Array, chosen: Mask | None = None) -> int:
-        sizes = np.nan_to_num(length(left, self.quantities[self.quantity]))
+    def _worst(self, left: Observations, chosen: Mask | None = None) -> int:
+        sizes = np.nan_to_num(lengths(left, self.quantities[self.quantity]))
         return int(np.argmax(sizes if chosen is None else np.where(chosen, sizes, -1.0)))
 
     def choose(self, chosen: Mask | None) -> None:
         """Look at some of the units, or at all, and at the worst of them in three dimensions."""
         self.chosen = chosen
-        self.moment = self._worst(self.views[self.version].left.values, chosen)
+        self.moment = self._worst(self.views[self.version].left, chosen)
         self.draw()
 
     def look(self, version: int) -> None:
@@ -204,17 +205,17 @@ class Tab:
         if self.version not in self.views:
             return None
         view, quantity = self.views[self.version], self.quantities[self.quantity]
-        values = view.left.values
-        after, name = None, ""
+        left, after, name = view.left, None, ""
         if self.seen is not None:
-            after, name = values - self.seen.change, f"with {self.candidate}"
+            after = left.with_values(left.values - self.seen.change)
+            name = f"with {self.candidate}"
         elif self.against in self.views:
-            after = self.views[self.against].left.values
+            after = self.views[self.against].left
             name = self.rows[self.against].titled(self.against)
         # One scale of colours and one direction for all versions: so the error is seen to fall.
-        first = self.views[0].left.values
-        scale = float(np.nanpercentile(length(first, quantity), ASIDE))
-        axis = strongest(first, quantity) if self.axis is None else self.axis
+        first = self.views[0].left
+        scale = float(np.nanpercentile(lengths(first, quantity), ASIDE))
+        axis = strongest(first.values, quantity) if self.axis is None else self.axis
         return Shown(view, after, name, quantity, axis, scale, self.chosen, self.moment)
 
     @property

@@ -21,7 +21,7 @@ from wrist_stiffness.mechanism.energy import component_screws
 from wrist_stiffness.mechanism.influence import influence
 from wrist_stiffness.mechanism.modes import NaturalModes
 from wrist_stiffness.mechanism.statics import contact_operators, platform_twist
-from wrist_stiffness.mechanism.vectors import cross, triad, unit
+from wrist_stiffness.mechanism.vectors import cross, frame_about, unit
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 SHOWN_M = 0.010
@@ -224,7 +224,7 @@ def _bushing(
 
 def _around(axis: Array, count: int) -> Array:
     """Return unit vectors all around an axis, (count, 3)."""
-    across = triad(axis, np.eye(3)[np.argmin(np.abs(axis))])[:, 1:]
+    across = frame_about(axis)[:, 1:]
     turn = np.linspace(0.0, 2.0 * np.pi, count)
     return np.asarray(np.stack([np.cos(turn), np.sin(turn)], axis=1) @ across.T)
 

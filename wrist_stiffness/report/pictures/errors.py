@@ -13,7 +13,7 @@ from wrist_stiffness.comparing.curve import CELL_DEG, Curve, classes_of, since_s
 from wrist_stiffness.comparing.explained import Told
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.report.page import typeset
+from wrist_stiffness.report.page import title, typeset
 from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure
 
 LINES = {"--": "dashed", ":": "dotted", "-.": "dash-dotted"}
@@ -104,7 +104,7 @@ def draw_map(border: Array, models: Sequence[ComparedModel]) -> Any:
         figure.colorbar(
             shown,
             ax=column.tolist(),
-            label=typeset(f"{quantity.name} [{quantity.unit}], RMS in a cell"),
+            label=typeset(f"{title(quantity.key)}, RMS in a cell"),
             extend="max" if above else "neither",
             location="bottom",
             shrink=0.9,
@@ -153,7 +153,7 @@ def draw_time_line(found: Comparison, models: Sequence[ComparedModel]) -> Any:
             plot.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise floor")
             plot.set_ylim(bottom=0.0)
             plot.grid(alpha=0.3)
-        row[0].set_ylabel(typeset(f"{quantity.name} [{quantity.unit}]"))
+        row[0].set_ylabel(typeset(title(quantity.key)))
     for plot, number in zip(plots[0], numbers, strict=True):
         plot.set_title(_shortened(found.sessions[number]), fontsize=9)
     for plot in plots[-1]:

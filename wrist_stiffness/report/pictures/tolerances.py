@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from wrist_stiffness.commands.tolerances import ToleranceStudy
-from wrist_stiffness.report.page import TITLES, typeset
+from wrist_stiffness.report.page import title, typeset
 from wrist_stiffness.report.pictures.figure import new_figure, save_figure
 
 
@@ -20,8 +20,7 @@ def draw_tolerances(study: ToleranceStudy, path: Path) -> None:
     for axis, key, colour in zip(axes, study.whole.size, ("tab:blue", "tab:orange"), strict=True):
         value, sigma = np.array([cost.size[key] for cost in rows]).T
         axis.barh(places, value, xerr=sigma, color=colour, error_kw={"linewidth": 1.0})
-        title = typeset(TITLES[key])
-        axis.set_xlabel(f"{title}, RMS; all together {study.whole.size[key][0]:.3g}")
+        axis.set_xlabel(f"{typeset(title(key))}, RMS; all together {study.whole.size[key][0]:.3g}")
         axis.set_xlim(left=0.0)
         axis.grid(axis="x", linewidth=0.4)
         axis.set_axisbelow(True)
