@@ -66,7 +66,7 @@ def test_a_wrong_wrist_is_calibrated_to_the_noise_of_a_day_not_seen(tmp_path, ca
     assert {key: estimate.value for key, estimate in written.items()} == pytest.approx(newest)
     # All were fitted together, so a node evaluates the model once for a sample.
     assert model.variations == ()
-    assert 0.0 < model.joint.sigma[:3].max() < 1e-6
+    assert 0.0 < model.joint.measured[:3].max() < 1e-6
 
 
 @pytest.mark.slow

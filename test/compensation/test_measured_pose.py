@@ -1,5 +1,7 @@
 """What the pose sensor says, in any frame, by poses or markers, on a frame that moves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,6 +11,7 @@ from wrist_stiffness.compensation.monitor import MonitorSettings, MonitorStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError
 from wrist_stiffness.model.error_model import Load
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 
 SECOND = 1_000_000_000
 NAMES = ("motor_1_joint", "motor_2_joint")
@@ -50,6 +53,19 @@ def quaternion(rotation):
 
 def assert_extra(judged):
     assert np.allclose(judged.residual, EXTRA, rtol=0, atol=FIRST_ORDER)
+
+
+def test_what_a_registration_hides_is_no_uncertainty_of_a_residual(stream, pose, model):
+    """Else a calibrated model would blunt the alarm by tens of micrometres that never change."""
+    rotation, place = pose
+    seen = SECOND, "wrist_base", place, quaternion(rotation)
+    before = stream.on_pose(*seen).covariance
+    hidden = JointUncertainty((), np.full(6, 1e-7), np.full(6, 3e-5))
+    stream.model = replace(model, joint=hidden)
+    added = stream.on_pose(*seen).covariance - before
+    assert np.allclose(added, 1e-14 * np.eye(6), rtol=1e-3, atol=1e-18)
+    predicted = [each.predict(THETA, Load(DOWN)).covariance for each in (stream.model, model)]
+    assert np.allclose(predicted[0] - predicted[1], 9e-10 * np.eye(6), rtol=1e-6, atol=1e-16)
 
 
 def test_markers_tell_the_same_residual_as_the_pose(stream, pose, model):

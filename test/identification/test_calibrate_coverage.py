@@ -1,9 +1,10 @@
-"""On wrists that are off their drawing, calibrate's uncertainties are as large as its errors."""
+"""The uncertainties that calibrate states are as large as its errors."""
 
 import numpy as np
 import pytest
 
 from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.model.block import Load
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.base import base_laws
@@ -47,3 +48,20 @@ def test_errors_of_stiffness_are_as_large_as_their_uncertainties(in_the_cell):
     assert errors.shape == (len(SEEDS), 8)
     assert LEAST_RMS < np.sqrt(np.mean(errors**2)) < MOST_RMS
     assert np.abs(errors).max() < FARTHEST
+
+
+@pytest.mark.parametrize("seed", [1002, 1004])
+def test_the_platform_is_off_by_what_is_stated_and_not_by_what_an_instrument_sees(
+    in_the_cell, seed
+):
+    """Of a wrist as drawn: an axis and a registration that trade shift every pose alike."""
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+    settings = CellSettings(rate_hz=RATE_HZ, program_seconds=120.0, program_seed=seed)
+    found = calibrate(model, [in_the_cell(model.table, settings, seed)]).model
+    own = [each for each in found.effects if not each.law.of_measurement(each.component)]
+    at = np.array([0.3, -0.2]), Load(np.zeros(6))
+    prediction, truth = found.with_effects(*own).predict(*at), model.predict(*at)
+    off = (prediction.twist - truth.twist)[:3]
+    sigma = np.sqrt(np.diag(prediction.covariance))[:3]
+    assert np.linalg.norm(off) > 30.0 * np.linalg.norm(found.joint.measured[:3])
+    assert np.linalg.norm(off) < FARTHEST * np.linalg.norm(sigma) < 200e-6

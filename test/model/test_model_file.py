@@ -5,6 +5,7 @@ from importlib import metadata
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -395,16 +396,24 @@ def test_other_packages_offer_laws_by_entry_point(monkeypatch, tmp_path):
 def test_joint_uncertainty_counts_once_and_survives_writing(tmp_path):
     """Two twins that a fit told only together: their own uncertainties would say 40 mdeg."""
     sigma = np.array([1e-7, 2e-7, 3e-7, 1e-5, 2e-5, 3e-5])
+    measured = 0.1 * sigma
     twins = (
         Effect(find_law("encoder_offset"), "motor_1", {"offset_mdeg": Estimate(3.0, 40.0)}),
         Effect(find_law("backlash"), "motor_2", {"width_mdeg": Estimate(10.0, 1.0)}),
     )
     plain = load_model(shipped_file("config/palmieri2015_model.yaml")).with_effects(*twins)
-    fitted = replace(plain, joint=JointUncertainty((twins[0].name,), sigma))
+    fitted = replace(plain, joint=JointUncertainty((twins[0].name,), measured, sigma))
     save_model(fitted, tmp_path / "m.yaml")
     again = load_model(tmp_path / "m.yaml")
     assert again.joint.effects == (twins[0].name,)
-    assert np.allclose(again.joint.sigma, sigma, rtol=1e-12)
+    assert np.allclose(again.joint.measured, measured, rtol=1e-12)
+    assert np.allclose(again.joint.platform, sigma, rtol=1e-12)
+    older = yaml.safe_load((tmp_path / "m.yaml").read_text())
+    joint = older["joint_uncertainty"]
+    older["joint_uncertainty"] = {k: v for k, v in joint.items() if not k.startswith("platform")}
+    (tmp_path / "older.yaml").write_text(yaml.safe_dump(older))
+    before = load_model(tmp_path / "older.yaml").joint
+    assert np.allclose(before.platform, measured, rtol=1e-12)
     assert [len(each.variations) for each in (plain, again)] == [2, 1]
     sample = Sample(0.0, np.radians([10.0, 5.0]), Load(np.zeros(6)))
     covariance = again.session().advance(sample).covariance

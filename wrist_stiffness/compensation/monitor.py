@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -146,6 +146,11 @@ class MonitorStream(Stream):
         self._judged: ErrorModel | None = None
         # statistics and alarm since the model was loaded
         self.monitor = ResidualMonitor(monitoring)
+
+    def _used(self, model: ErrorModel) -> ErrorModel:
+        """Take the uncertainty of what is measured: what a registration hides never changes."""
+        joint = model.joint
+        return model if joint is None else replace(model, joint=joint.as_measured)
 
     def on_joint_state(
         self,

@@ -17,7 +17,6 @@ from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.held_out import refuted
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import all_units
@@ -194,4 +193,4 @@ def told_model(found: WristFit, keep: Sequence[str] = ()) -> ErrorModel:
     joint = found.joint
     kept = tuple(name for name in joint.effects if name in names)
     model = problem.model.with_effects(*effects)
-    return replace(model, joint=JointUncertainty(kept, joint.sigma))
+    return replace(model, joint=replace(joint, effects=kept))

@@ -261,10 +261,14 @@ class WristFit:
         if any(each.gauges is not None for each in self.problem.sessions):
             rows = self.problem.twists(self.z)
             measured = np.ones(rows.shape[:2], dtype=bool)
-        variance = np.einsum("uij,jk,uik->ui", rows, self.covariance, rows)
-        mean = (variance * measured).sum(axis=0) / np.maximum(measured.sum(axis=0), 1)
-        names = tuple(free.effect.name for free in self.problem.free)
-        return JointUncertainty(names, np.sqrt(mean))
+        # What is wrong with a measurement alone moves no platform.
+        moves = [not u.effect.law.of_measurement(u.effect.component) for u in self.problem.unknowns]
+        sigmas = []
+        for columns in (rows, rows * moves):
+            variance = np.einsum("uij,jk,uik->ui", columns, self.covariance, columns)
+            mean = (variance * measured).sum(axis=0) / np.maximum(measured.sum(axis=0), 1)
+            sigmas.append(np.sqrt(mean))
+        return JointUncertainty(tuple(free.effect.name for free in self.problem.free), *sigmas)
 
     def model(self, session: int = -1) -> ErrorModel:
         """Return the model with the fitted effects, as a session has them."""

@@ -90,7 +90,8 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
     covariance = model.table_covariance(configuration, result.twist[0])
     together: tuple[str, ...] = ()
     if model.joint is not None:
-        together, covariance = model.joint.effects, covariance + model.joint.covariance
+        known = model.joint.as_measured
+        together, covariance = known.effects, covariance + known.covariance
     for share in effects:
         if share.name not in together:
             covariance = covariance + share.spread.T @ share.spread

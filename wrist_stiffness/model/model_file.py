@@ -29,7 +29,7 @@ from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.formula_law import FormulaLaw
-from wrist_stiffness.model.joint_uncertainty import KEYS, JointUncertainty
+from wrist_stiffness.model.joint_uncertainty import KEYS, PLATFORM, JointUncertainty
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.parameters import Estimate
@@ -81,6 +81,7 @@ MODEL = record(
         ),
         "joint_uncertainty": record(
             {"effects": list_of(text()), **dict.fromkeys(KEYS, number(at_least=0.0))},
+            {PLATFORM + key: number(at_least=0.0) for key in KEYS},
             make=JointUncertainty.of_values,
         ),
     },

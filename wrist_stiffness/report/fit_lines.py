@@ -10,8 +10,10 @@ import numpy as np
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
 from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.report.page import Table, plus_minus, title
 from wrist_stiffness.sessions.measured_session import MeasuredSession
+from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
 if TYPE_CHECKING:
     from wrist_stiffness.commands.calibrate import Calibrated
@@ -37,6 +39,7 @@ def calibration_lines(found: Calibrated) -> list[str]:
     result, parameters = found.calibration, found.calibration.parameters
     rows = {"model as it stands": result.before, "calibrated": result.after}
     lines = _judged_lines(found.sessions, result.fit, result.judged_by, rows)
+    lines += [uncertainty_line(result.fit.joint)]
     lines += [f"WARNING: {warning}" for warning in result.warnings]
     lines += [found.mistake] if found.mistake else []
     parts = {
@@ -59,6 +62,19 @@ def calibration_lines(found: Calibrated) -> list[str]:
     if result.calibrated:
         lines += ["", f"not fitted, calibrated as the notes say: {', '.join(result.calibrated)}"]
     return lines
+
+
+def uncertainty_line(joint: JointUncertainty) -> str:
+    """Tell how well a fit knows where the platform is, for whom."""
+    as_measured, in_f = (
+        f"{MICROMETRES * np.linalg.norm(sigma[:3]):.2g} um and "
+        f"{MILLIDEGREES * np.linalg.norm(sigma[3:]):.2g} mdeg"
+        for sigma in (joint.measured, joint.platform)
+    )
+    return (
+        f"uncertainty of predictions: {as_measured} for the instrument as it is set up here, "
+        f"{in_f} in the wrist's own frame; place parts by this instrument"
+    )
 
 
 def extension_lines(found: Extended) -> list[str]:
