@@ -106,6 +106,7 @@ def answer(case: Case) -> dict[str, Any]:
         right = right_components(effect, place)
         line["right_component"] = any(each.component in right for each in found.terms)
         line["right_sentence"] = is_right(effect, place, found.terms)
+        line["among_laws"] = is_right(effect, place, [*found.terms, *found.rivals])
         # Of the second law the probability is that both are right.
         right_ones = [is_right(effect, place, [each]) for each in found.terms]
         line["right_laws"] = np.logical_and.accumulate(right_ones).tolist()
@@ -188,6 +189,9 @@ def process(fit: WristFit, ground: Background, rows: Array) -> Array:
     return -sum((g.change(z) for g, z, law in laws if law), np.zeros_like(fit.base.residual))
 
 
+RIGHT = ("right_component", "right_sentence", "among_laws")
+"""What is counted of each line; the last one with the rivals that are told beside the laws."""
+
 WHERE = {
     "right_sentence": "right, and so is the sentence",
     "right_component": "right",
@@ -208,7 +212,7 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
         own = ["", *(name for name, entries in BLIND.items() if each["truth"][0] in entries)]
         beyond = 3.0 * np.sqrt(2.0 * each["numbers"])
         gains = {name: each["nothing"] - each[name] for name in ("law", "process")}
-        right = {key: each[key] for key in ("right_component", "right_sentence")}
+        right = {key: each[key] for key in RIGHT}
         right["a law"] = bool(each["laws"])
         above = each["nothing"] - each["numbers"]
         if above > beyond:
