@@ -6,6 +6,8 @@ import pytest
 from wrist_stiffness.compensation.belief import SupervisorSettings
 from wrist_stiffness.compensation.correction import correct, residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.load_history import Zero
+from wrist_stiffness.compensation.monitor import MonitorSettings, MonitorStream
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.compensation.trajectory_plan import planned_point
@@ -16,7 +18,9 @@ from wrist_stiffness.errors import (
     StaleLoadError,
     UnreachablePoseError,
 )
+from wrist_stiffness.model.effect import effect_at
 from wrist_stiffness.model.error_model import ErrorModel, Load
+from wrist_stiffness.model.registry import find_law
 
 NAMES = ("motor_1_joint", "motor_2_joint")
 SECOND = 1_000_000_000
@@ -46,6 +50,42 @@ class Driver:
         for _ in range(50):
             command = self.send(**options)
         return command
+
+
+BIAS = {"fx_N": 0.2, "fy_N": -0.15, "fz_N": 0.2, "mx_Nmm": -4.0, "my_Nmm": 1.0, "mz_Nmm": 2.0}
+"""Of a load sensor, as a calibration finds it."""
+READS = np.array([*list(BIAS.values())[:3], *(1e-3 * each for each in list(BIAS.values())[3:])])
+MONITORING = MonitorSettings(np.full(6, 1e-6), joint_age_limit_s=1.0)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [PredictionStream, lambda *given: MonitorStream(*given, MONITORING)],
+    ids=["prediction", "monitor"],
+)
+def test_what_a_tare_takes_away_is_not_taken_away_twice(model, made):
+    """An empty platform, a sensor that reads its bias, a model that knows it: before and after."""
+    biased = model.with_effects(effect_at(find_law("load_bias"), "load_sensor", BIAS))
+    stream = made(biased, EVERY_LOAD)
+
+    def predicted():
+        stream.loads.add(SECOND, "wrist_base", READS[:3], READS[3:])
+        return stream.running_model().advance(SECOND, THETA, stream.loads.at(SECOND)[1]).twist
+
+    empty = model.predict(THETA, Load(np.zeros(6))).twist
+    assert predicted() == pytest.approx(empty, abs=ROUNDING)
+    stream.use_zero(Zero(Load(READS), np.zeros(6)))
+    assert predicted() == pytest.approx(empty, abs=ROUNDING)
+    stream.use_zero(None)
+    assert predicted() == pytest.approx(empty, abs=ROUNDING)
+
+
+def test_a_tared_corrector_knows_an_empty_platform(model):
+    biased = model.with_effects(effect_at(find_law("load_bias"), "load_sensor", BIAS))
+    driver, sound = corrector(biased), corrector(model)
+    driver.stream.use_zero(Zero(Load(READS), np.zeros(6)))
+    command = driver.settle(load=READS)
+    assert command.theta == pytest.approx(sound.settle(load=np.zeros(6)).theta, abs=ROUNDING)
 
 
 def corrected(model, theta, load, objective):

@@ -65,6 +65,7 @@ class CorrectionStream(Stream):
 
     def _used(self, model: ErrorModel) -> ErrorModel:
         """Leave out what is wrong with a measurement alone: commands are no measurement."""
+        model = super()._used(model)
         of_wrist = [each for each in model.effects if not each.law.of_measurement(each.component)]
         return model if len(of_wrist) == len(model.effects) else model.with_effects(*of_wrist)
 

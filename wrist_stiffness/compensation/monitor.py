@@ -149,6 +149,7 @@ class MonitorStream(Stream):
 
     def _used(self, model: ErrorModel) -> ErrorModel:
         """Take the uncertainty of what is measured: what a registration hides never changes."""
+        model = super()._used(model)
         joint = model.joint
         return model if joint is None else replace(model, joint=joint.as_measured)
 

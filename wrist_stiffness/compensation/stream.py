@@ -58,8 +58,10 @@ class Stream:
         )
 
     def _used(self, model: ErrorModel) -> ErrorModel:
-        """Return what of a model counts for this stream."""
-        return model
+        """Return what of a model counts for this stream: not what a tare has taken away already."""
+        if self.loads.zero is None:
+            return model
+        return model.with_effects(*(each for each in model.effects if not each.law.tared))
 
     @property
     def settings(self) -> StreamSettings:
@@ -95,8 +97,14 @@ class Stream:
         return tuple(f"{name}: older than {limit_s:g} s, not used" for name in names)
 
     def use_zero(self, zero: Zero | None) -> None:
-        """Tare: take a zero off every load (see `LoadHistory.measured_zero`)."""
+        """Tare: take a zero off every load (see `LoadHistory.measured_zero`).
+
+        A model that knows the sensor's zero goes on without it, and remembers nothing yet.
+        """
+        changed = (zero is None) != (self.loads.zero is None)
         self.loads.zero = zero
+        if changed and self._model and any(each.law.tared for each in self._model.effects):
+            self.model = self._model
 
     def running_model(self) -> RunningModel:
         """Return the model with its memory, or raise InputError where there is none."""

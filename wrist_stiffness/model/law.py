@@ -79,6 +79,8 @@ class Law:
     inexactness : float
         Share of its own effect by which it is wrong on a real machine (assumed), the same for units
         under like conditions: a second effect no larger than that is no evidence.
+    tared : bool
+        Whether a tare of the load sensor takes it away.
     file : path or None
         The Python file of a user's own law.
     """
@@ -97,6 +99,7 @@ class Law:
     rests_together: bool = False
     smooth: bool = True
     inexactness: float = 0.1
+    tared: bool = False
     file: Path | None = None
 
     @property

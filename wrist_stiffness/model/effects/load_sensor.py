@@ -30,6 +30,7 @@ class LoadBias(Law):
     check = "tare the sensor; read it with the platform free"
     excited_by = "loads of several directions, and none"
     constant = True
+    tared = True
     inexactness = 0.0
     own = (*symmetric_vector(FORCE, 5.0, 0.1), *symmetric_vector(MOMENT, 100.0, 2.0))
 
