@@ -128,7 +128,7 @@ def test_a_rest_within_the_uncertainty_is_no_reason_to_search(model_path, loaded
         pose = pose_off_by(moved, loaded)
         verdicts.append(explain(model_path, POSE.tolist(), LOAD, measured=pose).verdict)
     assert "no more than the uncertainty" in verdicts[0]
-    assert "2.1 x and 0 x the uncertainty of the prediction: " in verdicts[1]
+    assert "2.1 x and 0 x the uncertainty of the prediction in that direction: " in verdicts[1]
     assert "an effect is missing" in verdicts[1]
     assert explain(model_path, POSE.tolist(), LOAD).verdict == ""
 

@@ -58,7 +58,8 @@ def explanation_lines(found: Explanation) -> list[str]:
     rows.append(_part(name, values["s_um"], sigma[0], values["phi_mdeg"], sigma[1], ""))
     lines = page.Table("", ("", "s [um]", "", "phi [mdeg]", "", ""), rows).lines()
     if found.measured:
-        lines.append("uncertainty of the prediction: {:.3f} um, {:.3f} mdeg".format(*spread))
+        along = "uncertainty of the prediction along the measured error: {:.3f} um, {:.3f} mdeg"
+        lines.append(along.format(*spread))
         lines.append(values["verdict"])
     return [*lines, *(f"note: {warning}" for warning in values["warnings"])]
 
