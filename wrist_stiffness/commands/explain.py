@@ -233,8 +233,8 @@ def _verdict(rest: Array, covariance: Array) -> str:
         return f"{left}: no more than the uncertainty of the prediction"
     shift, turn = (_plain(float(each), 2) for each in np.round(ratio, 2))
     return (
-        f"{left}, {shift} x and {turn} x the uncertainty of the prediction in "
-        "that direction: the measurement is off, or an effect is missing ('compare' and 'diagnose' tell from many "
+        f"{left}, {shift} x and {turn} x the uncertainty of the prediction in that direction: the "
+        "measurement is off, or an effect is missing ('compare' and 'diagnose' tell from many "
         "poses)"
     )
 
