@@ -79,7 +79,12 @@ def draw_bent_wrist(table: Table, theta: Array, push: Push, path: Path) -> None:
     figure = new_figure(8.0, 7.0)
     plot: Any = figure.add_subplot(projection="3d")
     colours = _draw_shapes(plot, shapes, factor, 1e6 * largest)
-    _draw_load(plot, table, theta, push)
+    configuration = table.mechanism.forward(theta)
+    if (size := float(np.linalg.norm(push.force))) > 0.0:
+        tip = 1e3 * (configuration.platform @ push.point)
+        arrow = 25.0 * push.force / size
+        plot.quiver(*(tip - arrow), *arrow, color="tab:red", linewidth=2.0)
+    _draw_axes_and_pins(plot, table, configuration)
     plot.set_title(
         f"{_at(table, theta)} under {push.text}\ndisplacement exaggerated {factor:g} times; "
         "bars interpolated between their ends",
@@ -238,14 +243,7 @@ def _platform(table: Table, configuration: Configuration, twist: Array) -> Shape
     return Shape(points, _shift(points, twist))
 
 
-def _draw_load(plot: Any, table: Table, theta: Array, push: Push) -> None:
-    configuration = table.mechanism.forward(theta)
-    size = float(np.linalg.norm(push.force))
-    if size == 0.0:
-        return
-    tip = 1e3 * (configuration.platform @ push.point)
-    arrow = 25.0 * push.force / size
-    plot.quiver(*(tip - arrow), *arrow, color="tab:red", linewidth=2.0)
+def _draw_axes_and_pins(plot: Any, table: Table, configuration: Configuration) -> None:
     for joint in JOINTS:
         end = 1e3 * table.geometry.bushings[joint].radius * _axis(configuration, table, joint)
         plot.plot(*np.stack([np.zeros(3), end]).T, color="black", linewidth=0.4, linestyle=":")
