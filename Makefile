@@ -46,7 +46,6 @@ bench: $(READY)
 
 tables: $(READY)
 	$(RUN) wrist_stiffness table build config/palmieri2015.yaml -o precomputed/palmieri2015.npz
-	$(RUN) wrist_stiffness table build config/palmieri2015.yaml -o precomputed/palmieri2015_25_poses.npz --grid 5 --kernel sandwell
 
 clean:
 	rm -rf $(VENV) demo site build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

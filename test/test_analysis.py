@@ -7,6 +7,8 @@ import wrist_stiffness.analysis as analysis_module
 from wrist_stiffness.analysis import Analysis, Cancelled
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
+from wrist_stiffness.model.effect import effect_at
+from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
@@ -145,13 +147,40 @@ def test_what_is_cancelled_changes_nothing(model, sessions):
     assert [each.name for each in analysis.versions] == ["as given"]
 
 
+def test_a_preview_can_be_cancelled(model, sessions):
+    steps = []
+
+    def cancelling(done, total):
+        steps.append(done)
+        if done == 1:
+            analysis.cancel()
+
+    analysis = Analysis(model, sessions[:1], progress=cancelling)
+    with pytest.raises(Cancelled):
+        analysis.preview(PLAY)
+    assert steps == [0, 1]
+
+
+def test_what_the_model_has_is_refused_before_any_fit(model, sessions, fitted):
+    known = model.with_effects(effect_at(find_law("backlash"), "motor_2", {"width_mdeg": 60.0}))
+    analysis = Analysis(known, sessions[:1])
+    fitted.clear()
+    analysis._problems.clear()
+    for ask in (analysis.preview, analysis.add):
+        with pytest.raises(InputError, match="the model has it already"):
+            ask(PLAY)
+    assert not fitted
+
+
 def test_wrong_use_is_one_clear_line(model, sessions):
     with pytest.raises(InputError, match="an analysis needs a session"):
         Analysis(model, [])
-    analysis = Analysis(model, sessions[:1])
+    analysis = Analysis(model, {"day": sessions[0]})
     with pytest.raises(InputError, match="nothing to undo"):
         analysis.undo()
     with pytest.raises(InputError, match="write NAME@COMPONENT"):
         analysis.preview("backlash")
-    with pytest.raises(IndexError):
-        analysis.view(1)
+    for ask in (analysis.view, analysis.compare):
+        for number in (1, -2):
+            with pytest.raises(InputError, match=f"no version {number}: the newest is 0"):
+                ask(number)

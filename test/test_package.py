@@ -2,6 +2,7 @@ import ast
 import configparser
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,8 +15,10 @@ import pytest
 
 import wrist_stiffness
 from wrist_stiffness import shipped
+from wrist_stiffness.cli.main import COMMANDS, build_parser
 from wrist_stiffness.commands.node_list import SIMULATOR_NODE, WRIST_NODES, NodeEntry
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.shipped import shipped_file
 
 ROOT = Path(__file__).parents[1]
@@ -108,6 +111,15 @@ def test_shipped_file_of_the_source_tree(source):
     ).split()
     assert Path(module_file).parent.parent == source
     assert Path(found) == source / PROBE
+
+
+def test_make_tables_builds_the_shipped_tables_and_each_can_be_loaded():
+    parser, makefile = build_parser(COMMANDS), (ROOT / "Makefile").read_text()
+    lines = re.findall(r"\$\(RUN\) wrist_stiffness (table build .*)", makefile)
+    built = {parser.parse_args(shlex.split(line)).output for line in lines}
+    assert built == {str(path.relative_to(ROOT)) for path in ROOT.glob("precomputed/*")}
+    for each in built:
+        load_table(ROOT / each)
 
 
 def test_missing_shipped_file_says_where_it_was_looked_for(tmp_path, monkeypatch):

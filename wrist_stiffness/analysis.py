@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from threading import Event
 from typing import Any
 
@@ -26,7 +27,7 @@ from wrist_stiffness.comparing.comparison import Comparison
 from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.identification.base_fit import BaseFit, free_base
 from wrist_stiffness.identification.calibration import calibrate
-from wrist_stiffness.identification.extension import extend
+from wrist_stiffness.identification.extension import base_beside, extend
 from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.held_out import Judge
 from wrist_stiffness.identification.problem import FitProblem
@@ -51,6 +52,9 @@ from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import without_mounting
 from wrist_stiffness.sessions.refitted import SET_UP, names_of
 from wrist_stiffness.sessions.unit_session import all_units
+
+PREVIEW_STEPS = 3
+"""That are told of."""
 
 
 class Cancelled(WristError):
@@ -143,8 +147,9 @@ class Analysis:
     ----------
     model : ErrorModel
         What is known of the wrist.
-    sessions : sequence of MeasuredSession
-        In the order of time; the last one judges where there are several, else the end of it.
+    sessions : sequence of MeasuredSession, or dict of them
+        As `read_sessions` returns them, in the order of time; the last one judges where there are
+        several, else the end of it.
     progress : callable, optional
         Told steps done and in all.
     tell : callable, optional
@@ -162,17 +167,17 @@ class Analysis:
     def __init__(
         self,
         model: ErrorModel,
-        sessions: Sequence[MeasuredSession],
+        sessions: Sequence[MeasuredSession] | Mapping[Path, MeasuredSession],
         progress: Progress = silent,
         tell: Callable[[str], None] = lambda text: None,
         again: bool = False,
     ) -> None:
         if not sessions:
             raise InputError("an analysis needs a session")
-        self.sessions = tuple(sessions)
+        self.sessions = tuple(sessions.values() if isinstance(sessions, Mapping) else sessions)
         self._progress, self._tell = progress, tell
         self._stop, self._again = Event(), again
-        self._units = all_units(model, sessions)
+        self._units = all_units(model, self.sessions)
         self._problems: list[WristProblem] = []
         self._versions = [Version("as given", model, {})]
         error = Judge(self._problem().begin().base).of_model(model)
@@ -233,7 +238,7 @@ class Analysis:
         number : int, optional
             Place of the one.
         """
-        asked = self._versions if number is None else [self._versions[number]]
+        asked = self._versions if number is None else [self._version(number)]
         models = [(each.name, each.model) for each in asked]
         return compare_models(models, self.sessions, self._watched(self._progress))
 
@@ -293,22 +298,28 @@ class Analysis:
         Raises
         ------
         InputError
-            If there is no such law or component, or it finds no equilibrium here.
+            If there is no such law or component, the model has it already, or it finds no
+            equilibrium here.
         """
-        self._watched(self._progress)(0, 1)
-        problem, effect = self._problem(), _effect(candidate)
+        progress, effect = self._watched(self._progress), self._new(candidate)
+        progress(0, PREVIEW_STEPS)
+        problem = self._problem()
+        progress(1, PREVIEW_STEPS)
         begun = problem.begin()
         grown = problem.extended(begun, effect)
+        progress(2, PREVIEW_STEPS)
         table = self._shown.table
         # What a version leaves is told by its own fit, which may have ended in another valley.
         before, after = (self._left(each.base) for each in (self._fit(), grown))
         errors = [table.rms(np.nan_to_num(each) ** 2) for each in (before, after)]
-        return Preview(
+        seen = Preview(
             grown.base.beyond()[effect.name],
             before - after,
             grown.evidence.log - begun.evidence.log,
             {q.key: (errors[0][q.key], errors[1][q.key]) for q in table.reported},
         )
+        progress(PREVIEW_STEPS, PREVIEW_STEPS)
+        return seen
 
     def add(self, candidate: str | Effect) -> Version:
         """Add an effect to the newest model and fit both; the result becomes a version.
@@ -323,8 +334,8 @@ class Analysis:
         InputError
             If the model has it already, or the recordings lack a signal that it needs.
         """
-        effect, watched, known = _effect(candidate), self._watched(self._progress), self._problem()
-        found = extend(self._known(), effect, self.sessions, watched, known)
+        effect, watched = self._new(candidate), self._watched(self._progress)
+        found = extend(self._known(), effect, self.sessions, watched, self._problem())
         step = Step("extend", "", "", {}, added=effect.name)
         held_out = found.after.rms(found.quantities)
         own = next(each for each in found.model.effects if each.name == effect.name)
@@ -364,6 +375,18 @@ class Analysis:
         self._versions.append(Version(name, child, *told))
         return self._versions[-1]
 
+    def _new(self, candidate: str | Effect) -> Effect:
+        """Return an effect that the newest model may get."""
+        effect = _effect(candidate)
+        base_beside(self._known(), effect, self.sessions)
+        return effect
+
+    def _version(self, number: int) -> Version:
+        count = len(self._versions)
+        if not -count <= number < count:
+            raise InputError(f"there is no version {number}: the newest is {count - 1}")
+        return self._versions[number]
+
     def _known(self, number: int = -1) -> ErrorModel:
         """Return a version's model without what fits to these recordings found of its base."""
         last = range(len(self._versions))[number]
@@ -383,7 +406,7 @@ class Analysis:
 
     def _fit(self, number: int = -1) -> WristFit:
         """Return what a version was fitted with; only the model as given needs a fit for it."""
-        fit = self._versions[number].fit
+        fit = self._version(number).fit
         return self._problem(number).begin() if fit is None else fit
 
     @property

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.cli.main import main
-from wrist_stiffness.recording.messages import Header, JointState, Vector3, Wrench, WrenchStamped
+from wrist_stiffness.recording.messages import (
+    Header,
+    JointState,
+    String,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
 from wrist_stiffness.recording.reader import open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
 
@@ -41,6 +48,7 @@ def test_summary_is_told_to_people_and_programs(recording, capsys):
     (reason,) = told.pop("refused")
     assert "outside the table's domain" in reason
     assert told == {
+        "remarks": [],
         "joint_states": 10,
         "predictions": 8,
         "commands": 10,
@@ -51,6 +59,18 @@ def test_summary_is_told_to_people_and_programs(recording, capsys):
         "changes": [],
         "damage": "",
     }
+
+
+def test_that_a_recording_is_of_another_wrist_is_told_first(recording, capsys):
+    with RecordingWriter("noted") as writer:
+        writer.write("/recording_notes", String('{"geometry_sha256": "ffff"}'), 0)
+        for topic, log_time_ns, message in open_recording(recording).messages():
+            writer.write(topic, message, log_time_ns)
+    assert main(["replay", "noted", "-o", "out", "--json", "out.json"]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert "the recording is of another wrist, or its geometry was changed" in first
+    with open("out.json", encoding="utf-8") as file:
+        assert json.load(file)["remarks"] == [first]
 
 
 def test_output_may_be_one_file(recording):

@@ -207,10 +207,10 @@ def test_errors_of_options(tmp_path, capsys, options, words):
 
 
 def test_a_commissioning_needs_a_duration(tmp_path, capsys):
-    files(tmp_path)
-    arguments = ["--commissioning", "--loads", str(tmp_path / "loads.yaml")]
-    assert main(["plan", *arguments, "-o", str(tmp_path / "next")]) == 2
-    assert "--minutes says how long a commissioning may take" in capsys.readouterr().err
+    # Said before any file is read: none of these is there.
+    arguments = ["none.yaml", "--commissioning", "--loads", "none.yaml", "-o", str(tmp_path / "a")]
+    assert main(["plan", *arguments]) == 2
+    assert "error: give --minutes: how long the commissioning may take" in capsys.readouterr().err
 
 
 def test_files_that_cannot_be_read(tmp_path, capsys):

@@ -19,6 +19,7 @@ from wrist_stiffness.commands.read_sessions import (
     was_fitted_to,
 )
 from wrist_stiffness.commands.replay import replay
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.recording import RecordingWriter, open_recording
@@ -39,6 +40,11 @@ def test_a_copy_of_a_recording_is_no_second_session(tmp_path, model):
     (session,) = read([THURSDAY, copy], model).values()
     assert session.name == "thursday.mcap"
     assert session.remarks[-1] == f"{copy} holds the same measurements: used once"
+
+
+def test_without_a_model_no_recording_is_read():
+    with pytest.raises(InputError, match="needs a model"):
+        read([THURSDAY])
 
 
 def test_a_recording_given_twice_is_used_once_and_said(model):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness.commands.calibrate import Calibrated
 from wrist_stiffness.identification.base_fit import best_valley, fit_cleaned
 from wrist_stiffness.identification.calibration import calibrate, fitted, told_model
 from wrist_stiffness.identification.free_effects import FreeEffect, commissioning, free_all
@@ -313,6 +314,7 @@ def test_what_makes_another_day_worse_is_not_handed_over(model):
     assert found.refused["s_um"] > 3.0 * found.after["s_um"]
     assert {each.law.id for each in found.model.effects} <= {law for law, _ in SET_UP}
     assert "the part that judges comes out worse" in found.warnings[0]
+    assert Calibrated(found, tuple(days), "").as_values()["warnings"] == list(found.warnings)
     assert not calibrate(model, [days[1], replace(days[1], name="again")]).refused
 
 

@@ -35,7 +35,8 @@ from wrist_stiffness.errors import InputError
     output("PLAN", "folder to make"),
     option(
         "--minutes",
-        "duration (default with --diagnosis: as long as it takes, up to 60)",
+        "duration, which --commissioning needs (default with --diagnosis: as long as it takes, up "
+        "to 60)",
         type=float,
     ),
     value("--speed", 30.0, "fastest motor speed", "DEG_S"),
@@ -77,6 +78,8 @@ def plan(arguments: argparse.Namespace) -> int:
 
     Exit code 1: no experiment with these loads would settle any of the questions.
     """
+    if arguments.commissioning and arguments.minutes is None:
+        raise InputError("give --minutes: how long the commissioning may take")
     from wrist_stiffness.commands.plan import Options, plan_experiment
     from wrist_stiffness.report.plan import plan_summary, require_new_folder, write_plan
 

@@ -37,6 +37,7 @@ class Calibrated:
             **fit_values(found.fit, found.before, found.after, found.judged_by, self.sessions),
             "set_up_mistake": self.mistake,
             "refused": {f"rmse_{key}": value for key, value in found.refused.items()},
+            "warnings": list(found.warnings),
             "calibrated_otherwise": list(found.calibrated),
             "parameters": parameter_values(found.parameters),
         }

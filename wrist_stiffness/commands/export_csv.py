@@ -81,7 +81,7 @@ def export_csv(
     output = Path(output)
     _require_place(output)
     source, samples, known = opened(recording, remaps or {}, settings)
-    notes, _ = notes_of(samples)
+    notes, _ = notes_of(samples.notes)
     try:
         machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):

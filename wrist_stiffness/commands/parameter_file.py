@@ -4,11 +4,14 @@
   ros__parameters: {frames: "{ft: {parent: wrist_platform}}"}
 angle_corrector:
   ros__parameters: {load_policy: follow}
+
+Names are matched as ROS 2 does: absolute, nested, `*` for one part of a name, `**` for any number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -23,11 +26,16 @@ from wrist_stiffness.compensation.parameters import (
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inputs.document import Node, read_yaml
-from wrist_stiffness.inputs.schema import Schema, mapping_of, number, record, text, truth
+from wrist_stiffness.inputs.schema import Schema, number, record, text, truth
 
-EVERY_NODE = "/**"
 KEY = "ros__parameters"
-PREDICTOR, CORRECTOR = "pose_error_predictor", "angle_corrector"
+ENTRIES = {
+    "pose_error_predictor": (*COMMON, *PREDICTION),
+    "angle_corrector": (*COMMON, *CORRECTION),
+}
+
+ANY = {"*": "/[^/]+", "**": "(/[^/]+)*"}
+"""What stands for one part of a node's name, and for any number of them."""
 
 
 def node_settings(
@@ -36,33 +44,69 @@ def node_settings(
     """Return the settings of the sample path of predictor and corrector.
 
     `path`: parameter file as `ros2 run --ros-args --params-file` takes it; None for the defaults.
-    `joints`: joint names of motor 1 and 2, which override the file's; empty for those.  Gives
-    `prediction`, `correction`: in SI units.  Raises `InputError` if the file is no parameter file,
-    or a parameter is unknown, of another type or out of range.
+    The nodes are those of the namespace of which it says most.  `joints`: joint names of motor 1
+    and 2, which override the file's; empty for those.  Gives `prediction`, `correction`: in SI
+    units.  Raises `InputError` if the file is no parameter file, a parameter is unknown, of another
+    type or out of range, or the nodes of two namespaces have different values.
     """
-    nodes: Mapping[str, Node] = {}
-    if path is not None:
-        root = read_yaml(path, InputError)
-        nodes = mapping_of(lambda node: node)(root)
-        if not any(isinstance(each.value, dict) and KEY in each.value for each in nodes.values()):
-            raise root.refuse(f"not a ROS 2 parameter file, no node in it has {KEY}")
+    said = [] if path is None else list(_said(read_yaml(path, InputError)))
     names = dict(zip(("motor_1_joint", "motor_2_joint"), joints, strict=False))
-    predictor = _values(nodes, PREDICTOR, (*COMMON, *PREDICTION))
-    corrector = _values(nodes, CORRECTOR, (*COMMON, *CORRECTION))
-    return stream_settings(predictor | names), stream_settings(corrector | names)
+    heard = {
+        space: {
+            (n, node)
+            for n, (name, _) in enumerate(said)
+            for node in ENTRIES
+            if _is_for(name, f"{space}/{node}")
+        }
+        for space in dict.fromkeys(["", *(_namespace(name) for name, _ in said)])
+    }
+    values = {
+        space: [_values(said, f"{space}/{node}", ENTRIES[node]) | names for node in ENTRIES]
+        for space, own in heard.items()
+        if not any(own < other for other in heard.values())
+    }
+    first, *others = values.values()
+    if any(other != first for other in others):
+        spaces = " and ".join(space or "/" for space in values)
+        raise InputError(
+            f"{path}: {spaces} give the nodes different values: name a file for one wrist"
+        )
+    prediction, correction = map(stream_settings, first)
+    return prediction, correction
+
+
+def _said(node: Node, name: str = "") -> Iterator[tuple[str, Node]]:
+    """Give the parameters in a file, in its order, each with the name of the nodes they are for."""
+    if not isinstance(node.value, dict):
+        raise node.refuse(f"is not below the name of a node and {KEY}: no ROS 2 parameter file")
+    if name and KEY in node.value:
+        yield name, record({KEY: lambda parameters: parameters})(node)[KEY]
+        return
+    for key, inner in node.value.items():
+        yield from _said(inner, re.sub("/+", "/", f"{name}/{key}"))
+
+
+def _namespace(name: str) -> str:
+    """Return the shortest namespace of the nodes that a name is for."""
+    return "/".join(part for part in name.split("/")[:-1] if part != "**")
+
+
+def _is_for(name: str, node: str) -> bool:
+    """Tell whether the name in a file is for a node, as ROS 2 matches them."""
+    pattern = "".join(ANY.get(part, f"/{re.escape(part)}") for part in name.split("/")[1:])
+    return re.fullmatch(pattern, node) is not None
 
 
 def _values(
-    nodes: Mapping[str, Node], node: str, entries: Sequence[ParameterEntry]
+    said: Iterable[tuple[str, Node]], node: str, entries: Sequence[ParameterEntry]
 ) -> dict[str, Any]:
-    """Defaults, then what the file says of every node, then of this one."""
+    """Return the defaults and what the file says of a node; what stands further down counts."""
     values: dict[str, Any] = {entry.name: entry.default for entry in entries}
     schemas = {entry.name: _schema_of(entry) for entry in entries}
-    for name, block in nodes.items():
-        if name == EVERY_NODE or name.lstrip("/") == node:
-            # What every node is told may be meant for another one.
-            of_all = record({}, schemas, others=name == EVERY_NODE)
-            values |= record({KEY: of_all}, others=True)(block)[KEY]
+    for name, parameters in said:
+        if _is_for(name, node):
+            # What any node is told may be meant for another one.
+            values |= record({}, schemas, others=name.endswith("*"))(parameters)
     return values
 
 

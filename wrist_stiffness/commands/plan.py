@@ -46,7 +46,7 @@ class Options:
     Raises `InputError` if a number is not positive or the experiment longer than `LONGEST_MIN`.
     """
 
-    minutes: float | None  # duration; needed for a commissioning
+    minutes: float | None  # duration; None for what it takes
     speed_deg_per_s: float = 30.0  # largest speed of a motor
     dwell_s: float = 2.0  # what one measurement at rest takes, settling included
     in_motion: bool = True  # whether the pose sensor measures in motion too
@@ -110,16 +110,14 @@ def plan_experiment(
 ) -> Planned:
     """Plan the first experiment on a wrist, or the next one between rivals.
 
-    `loads`: file of the loads that the user can apply; `options`: the first experiment needs a
-    duration, the next one takes what it needs without; `diagnosis`: result of `diagnose --json`;
+    `loads`: file of the loads that the user can apply; `options`: duration, pace,
+    noise; `diagnosis`: result of `diagnose --json`;
     what it could not tell apart is asked; `recordings`: those of the diagnosis: its rivals are
     fitted to them, and what it left open counts as open.  Raises `WristError` if a file is wrong,
     nothing is left to separate, or nothing fits into the duration.
     """
     model, rng, earlier = load_model(model_file), np.random.default_rng(options.seed), []
     if diagnosis is None:
-        if options.minutes is None:
-            raise InputError("plan: --minutes says how long a commissioning may take")
         question = commissioning(rng)
         white = np.repeat([1e-6 * options.noise_um, MDEG * options.noise_mdeg], 3)
         noise = MeasurementNoise(white, model.table.geometry.limits.encoder_step)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from wrist_stiffness.compensation.settings import StreamSettings
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import CALIBRATED
 from wrist_stiffness.model.contribution import left_out
 from wrist_stiffness.model.error_model import ErrorModel
@@ -65,8 +66,10 @@ def read_sessions(
     Raises
     ------
     WristError
-        If a recording cannot be used.
+        If there is no model, or a recording cannot be used.
     """
+    if not models:
+        raise InputError("read_sessions needs a model: its table says of which wrist they are")
     given = recordings_in(recordings.paths)
     found: dict[Path, MeasuredSession] = {}
     first: dict[str, Path] = {}

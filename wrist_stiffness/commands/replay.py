@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from wrist_stiffness import topics
 from wrist_stiffness.commands.parameter_file import node_settings
@@ -19,6 +20,7 @@ from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.recording import messages as msg
 from wrist_stiffness.recording.reader import Recording, open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
+from wrist_stiffness.sessions.reading.session import another_geometry, notes_of
 
 OUTPUTS = (
     topics.POSE_ERROR_PREDICTED,
@@ -73,7 +75,7 @@ def replay(
     names = _actual_names(source, remaps or {})
     signals = {actual: standard for standard, actual in names.items() if standard not in SAMPLED}
     sampled = {names[standard]: standard for standard in SAMPLED if standard in names}
-    summary = ReplaySummary()
+    summary = ReplaySummary(another_geometry(_notes(source, remaps or {}), error_model.table))
     predicting = PredictionStream(error_model, prediction)
     correcting = CorrectionStream(error_model, correction, enabled=True)
     ahead = SignalsAhead(source, signals, (predicting, correcting), summary.refuse)
@@ -97,6 +99,12 @@ def replay(
     progress(total, total)
     summary.damage = source.damage
     return summary
+
+
+def _notes(source: Recording, remaps: Mapping[str, str]) -> dict[str, Any]:
+    topic = remaps.get(topics.RECORDING_NOTES, topics.RECORDING_NOTES)
+    said = (message for _, _, message in source.messages([topic]))
+    return notes_of(each.data for each in said if isinstance(each, msg.String))[0]
 
 
 def _actual_names(source: Recording, chosen: Mapping[str, str]) -> dict[str, str]:

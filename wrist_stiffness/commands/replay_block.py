@@ -74,6 +74,7 @@ class Sizes:
 class ReplaySummary:
     """What a replay did."""
 
+    remarks: list[str] = field(default_factory=list)  # on the whole recording
     # `joint_states`, `predictions`: joint states read, predictions written
     joint_states: int = 0
     predictions: int = 0
@@ -104,6 +105,7 @@ class ReplaySummary:
     def as_values(self) -> dict[str, Any]:
         """Return the counts and reasons as programs read them."""
         return {
+            "remarks": self.remarks,
             "joint_states": self.joint_states,
             "predictions": self.predictions,
             "commands": self.commands,

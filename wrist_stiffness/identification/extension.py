@@ -194,9 +194,7 @@ def extend(
         If the model has the effect already or calibration fits it anyway, or the recordings lack a
         signal that it needs.
     """
-    loose, held = commissioning(model, said_calibrated(sessions))
-    free = within_tolerances(loose, shimmed=effect.law.id != AXES)
-    _require_new(model, effect, free)
+    free, held = base_beside(model, effect, sessions)
     # A tolerance that is found is one no more: the usual prior would hold it back.
     others = tuple(each for each in free if each.effect.name != effect.name)
     if known is None or not known.asks(model, (others, held)):
@@ -227,7 +225,15 @@ def extend(
     return Extension(effect, found, base, before, after, judge.by)
 
 
-def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) -> None:
+def base_beside(
+    model: ErrorModel, effect: Effect, sessions: Sequence[MeasuredSession]
+) -> tuple[tuple[FreeEffect, ...], tuple[Effect, ...]]:
+    """Return what of the base is free beside an effect, and what stays as it is.
+
+    Raises `InputError` if the model has the effect already or calibration fits it anyway.
+    """
+    loose, held = commissioning(model, said_calibrated(sessions))
+    free = within_tolerances(loose, shimmed=effect.law.id != AXES)
     tolerances = {each.effect.name for each in free if each.effect.law.id in TOLERATED}
     # A tolerance of the model was calibrated only, or was found.
     found = {step.added for step in model.lineage} | ({effect.name} - tolerances)
@@ -237,6 +243,7 @@ def _require_new(model: ErrorModel, effect: Effect, free: Sequence[FreeEffect]) 
         raise InputError(
             f"{effect.name}: 'calibrate' fits it anew to every recording, there is nothing to add"
         )
+    return free, held
 
 
 def _require_signals(model: ErrorModel, effect: Effect, units: Sequence[UnitSession]) -> None:

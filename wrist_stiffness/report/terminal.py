@@ -136,8 +136,9 @@ def mode_lines(summary: ModeSummary) -> list[str]:
 def replay_lines(summary: ReplaySummary) -> list[str]:
     """Return what a replay did."""
     lines = [
+        *summary.remarks,
         f"{summary.predictions} predictions for {summary.joint_states} joint states, "
-        f"{summary.corrections} of {summary.commands} commands corrected"
+        f"{summary.corrections} of {summary.commands} commands corrected",
     ]
     if summary.trajectories:
         corrected = summary.corrected_trajectories

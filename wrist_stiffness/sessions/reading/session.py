@@ -10,7 +10,7 @@ encoder's count is the same on both sides, so nothing is smoothed.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -96,7 +96,7 @@ def read_session(
     """
     settings = settings or StreamSettings()
     recording, samples, known = opened(path, remaps or {}, settings)
-    notes, unread = notes_of(samples)
+    notes, unread = notes_of(samples.notes)
     try:
         machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
@@ -116,7 +116,7 @@ def read_session(
         read_s = np.ptp(session.block.time)
         damage = f"the recording is damaged, {read_s:.0f} s of it are used: {recording.damage}"
     faults = [str(fault) for fault in samples.faults]
-    other = _another_geometry(notes, table)
+    other = another_geometry(notes, table)
     said = (*unread, *other, *known.remarks, *faults, *session.remarks)
     remarks = (damage, *said) if damage else said
     return replace(session, notes=notes, remarks=remarks, damage=damage)
@@ -388,7 +388,7 @@ def _rigid_at(machine: MachineSignals, time_ns: Stamps, late_s: float, table: Ta
     return rigid
 
 
-def _another_geometry(notes: Mapping[str, Any], table: Table) -> list[str]:
+def another_geometry(notes: Mapping[str, Any], table: Table) -> list[str]:
     """Return a warning where the notes name another geometry: a table may have been made anew."""
     said, own = notes.get(GEOMETRY), table.geometry.sha256
     if said in (None, own):
@@ -399,11 +399,11 @@ def _another_geometry(notes: Mapping[str, Any], table: Table) -> list[str]:
     ]
 
 
-def notes_of(samples: Samples) -> tuple[dict[str, Any], list[str]]:
+def notes_of(texts: Iterable[str]) -> tuple[dict[str, Any], list[str]]:
     """Return the facts of all notes, later ones first choice, and what was no JSON."""
     notes: dict[str, Any] = {}
     unread = []
-    for text in samples.notes:
+    for text in texts:
         try:
             facts = json.loads(text)
         except (ValueError, RecursionError):
