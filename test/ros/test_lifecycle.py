@@ -21,6 +21,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import save_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.ros import changes
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, time_message
 from wrist_stiffness.ros.model_monitor import ModelMonitor
@@ -200,8 +201,8 @@ def test_a_tare_outlives_its_node_for_a_while(graph, tmp_path):
     again = graph.add(PoseErrorPredictor, **needed)
     assert again.stream.loads.zero.load.wrench.tolist() == zero.tolist() == [0, 0, -2.0, 0, 0, 0]
     content = json.loads(kept.read_text())
-    for changes in ({"time_s": time.time() - 61.0}, {"time_s": time.time() + 9.0}, {"frames": "x"}):
-        kept.write_text(json.dumps(content | changes))
+    for other in ({"time_s": time.time() - 61.0}, {"time_s": time.time() + 9.0}, {"frames": "x"}):
+        kept.write_text(json.dumps(content | other))
         later = AngleCorrector(  # The name of the node is that of the file.
             context=graph.context,
             cli_args=["--ros-args", "-r", "__node:=pose_error_predictor"],
@@ -248,9 +249,33 @@ def test_all_nodes_change_or_none(graph, model, tmp_path):
     assert "pose_error_predictor: " in refused.message
     assert "none.yaml" in refused.message
     assert [node.stream.model for node in nodes] == before
+    assert all(node.stream.loads.zero.load.wrench[2] == -2.0 for node in nodes)
     nodes[1].set_parameters([Parameter("model_file", value=str(path))])
     assert ask("reload_model").success
     assert all(len(node.stream.model.effects) == 1 for node in nodes)
+    new = [node.stream.model for node in nodes]
+    graph.load(SECOND + 1, frame_id="wrist_platform")
+    graph.until(lambda: all(node.stream.loads.newest_ns > SECOND for node in nodes), "loads")
+    assert "loads in wrist_base and in wrist_platform are mixed" in ask("tare").message
+    assert [node.stream.model for node in nodes] == new
+
+
+@pytest.mark.filterwarnings("ignore:failed to send response")
+def test_a_node_that_answers_too_late_keeps_the_change_before(graph, model_path, monkeypatch):
+    nodes = [
+        graph.add(make, model_file=str(model_path), model_load_limit_s=0.1)
+        for make in (AngleCorrector, PoseErrorPredictor)
+    ]
+    graph.load(SECOND)
+    graph.until(lambda: all(node.stream.loads.newest_ns for node in nodes), "loads")
+    assert graph.call(Trigger, "/tare_all", Trigger.Request()).success
+    monkeypatch.setattr(changes, "LONGEST_ANSWER_S", 0.3)
+    graph.executor.remove_node(nodes[1])
+    refused = graph.call(SetBool, "/enable_all", SetBool.Request(data=False))
+    assert "pose_error_predictor: no answer within 0.4 s" in refused.message
+    graph.executor.add_node(nodes[1])
+    graph.until(lambda: nodes[1]._prepared is not None, "the late answer")
+    assert all(node.stream.loads.zero is not None for node in nodes)
 
 
 def test_two_wrists_live_side_by_side(graph, model_path):
