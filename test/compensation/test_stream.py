@@ -177,6 +177,22 @@ def test_a_command_without_a_stamp_is_not_corrected(model):
     assert command.theta.tolist() == THETA.tolist()
 
 
+@pytest.mark.parametrize("enabled", [True, False])
+def test_without_stamps_the_correction_fades_by_the_time_of_arrival(model, enabled):
+    driver = corrector(model)
+    added = [driver.settle().theta - THETA]
+    driver.stream.enabled = enabled
+    for i in range(1, 51):
+        came_ns = driver.stamp_ns + i * STEP
+        added.append(driver.stream.on_command(0, "", NAMES, THETA, (), came_ns).theta - THETA)
+    slew = EVERY_LOAD.safety.slew * STEP / SECOND
+    assert np.abs(np.diff(added, axis=0)).max() == pytest.approx(slew)
+    assert added[-1].tolist() == [0.0, 0.0]
+    driver.stamp_ns = came_ns
+    again = driver.send().theta - THETA
+    assert np.abs(again).max() <= slew + ROUNDING
+
+
 def test_switching_off_fades_too(model):
     driver = corrector(model)
     delta = driver.settle().correction.delta

@@ -117,6 +117,22 @@ def test_a_correction_fades_out_and_in_with_the_states(graph, corrector):
     assert np.abs(coming[0]).max() <= slew * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_correction_fades_out_with_commands_without_a_stamp(graph, corrector, enabled):
+    corrector.load()
+    assert corrector.enable().success
+    for _ in range(12):
+        corrector.send()
+    assert corrector.enable(enabled).success
+    assert corrector.node.stream.applied.any()
+
+    def passed():
+        graph.joints(COMMANDS, 0, THETA)
+        return graph.heard[SENT][-1].position.tolist() == list(THETA)
+
+    graph.until(passed, "command without a correction")
+
+
 def test_inactive_it_stops_where_it_is_told_to_once_the_correction_has_faded(graph):
     corrector = Corrector(graph, inactive_commands="stop")
     corrector.load()

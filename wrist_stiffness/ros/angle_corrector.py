@@ -170,9 +170,9 @@ class AngleCorrector(WristNode):
     def _on_command(self, joints: JointSample) -> None:
         self._require_forwarding("command", joints.stamp_ns)
         stamp_ns = joints.stamp_ns
-        command = self.stream.on_command(
-            stamp_ns, joints.frame_id, joints.names, joints.positions, joints.velocities
-        )
+        said = joints.names, joints.positions, joints.velocities
+        now_ns = self.get_clock().now().nanoseconds
+        command = self.stream.on_command(stamp_ns, joints.frame_id, *said, now_ns)
         positions = tuple(command.positions.tolist())
         sent = joints._replace(frame_id=command.frame_id, positions=positions)
         self._command.publish(joint_payload(sent))
