@@ -203,7 +203,8 @@ def test_commands_are_answered_while_a_long_plan_is_corrected(graph, corrector):
 
 
 def test_a_tare_outlives_its_node_for_a_while(graph, tmp_path):
-    needed = {"state_folder": str(tmp_path), "tare_needed": True, "tare_age_limit_s": 60.0}
+    ages = {"tare_age_limit_s": 60.0, "load_age_limit_s": 60.0}
+    needed = {"state_folder": str(tmp_path), "tare_needed": True, **ages}
     node = graph.add(PoseErrorPredictor, **needed)
     status, values = graph.status("pose_error_predictor", lambda status, values: True)
     assert (status.level, status.message, values["tared"]) == (status.WARN, "not tared", "no")
@@ -235,7 +236,7 @@ def test_all_nodes_change_or_none(graph, model, tmp_path):
     path = tmp_path / "model.yaml"
     save_model(model, path)
     nodes = [
-        graph.add(make, model_file=str(path), load_policy="follow")
+        graph.add(make, model_file=str(path), load_policy="follow", load_age_limit_s=60.0)
         for make in (AngleCorrector, PoseErrorPredictor, ModelMonitor)
     ]
     before = [node.stream.model for node in nodes]
@@ -277,9 +278,9 @@ def test_all_nodes_change_or_none(graph, model, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:failed to send response")
-def test_a_node_that_answers_too_late_keeps_the_change_before(graph, model_path, monkeypatch):
+def test_a_node_that_answers_too_late_keeps_the_change_before(graph, monkeypatch):
     nodes = [
-        graph.add(make, model_file=str(model_path), model_load_limit_s=0.1)
+        graph.add(make, load_age_limit_s=60.0, model_load_limit_s=0.1)
         for make in (AngleCorrector, PoseErrorPredictor)
     ]
     graph.load(SECOND)
