@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.belief import SupervisorSettings
+from wrist_stiffness.compensation.belief import NO_LOAD, State, SupervisorSettings
 from wrist_stiffness.compensation.correction import correct, residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
+from wrist_stiffness.compensation.load_history import Zero
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.compensation.trajectory_plan import planned_point
@@ -191,6 +192,16 @@ def test_without_stamps_the_correction_fades_by_the_time_of_arrival(model, enabl
     driver.stamp_ns = came_ns
     again = driver.send().theta - THETA
     assert np.abs(again).max() <= slew + ROUNDING
+
+
+def test_a_load_in_another_frame_than_the_tare_is_no_known_load(model):
+    driver = corrector(model)
+    driver.stream.use_zero(Zero(Load(np.zeros(6)), np.zeros(6)))
+    driver.settle()
+    driver.stream.loads.add(driver.stamp_ns + STEP, "wrist_platform", DOWN[:3], DOWN[3:])
+    assert "another frame" in str(driver.send(load=None).fault)
+    told = driver.stream.supervision
+    assert (told.state, told.valid, told.text) == (State.UNSURE, False, NO_LOAD)
 
 
 def test_switching_off_fades_too(model):

@@ -27,7 +27,7 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.compensation.supervisor import Supervisor
 from wrist_stiffness.compensation.trajectory_plan import PlanCorrector, PlannedPoint
-from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, WristError
+from wrist_stiffness.errors import InputError, LoadRangeError, WristError
 from wrist_stiffness.mechanism.compiled import (
     CompiledCommands,
     CompiledWrist,
@@ -382,10 +382,12 @@ class CorrectionStream(Stream):
         """Return the load to correct for, or why there is none."""
         try:
             _, measured = self.loads.at(stamp_ns)
+        except WristError as error:
+            self.supervisor.lost()
+            return None, error
+        try:
             load = self._load_for(stamp_ns, theta, measured)
         except WristError as error:
-            if isinstance(error, StaleLoadError):
-                self.supervisor.lost()
             return None, error
         if self.supervisor.stamps[1] == stamp_ns:
             # With another payload the hysteresis begins anew.
