@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wrist_stiffness.compensation.belief import SupervisorSettings
+from wrist_stiffness.compensation.belief import NO_LOAD, State, SupervisorSettings
 from wrist_stiffness.compensation.correction import correct, residual_twist
 from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.load_history import Zero
@@ -215,6 +215,32 @@ def test_a_command_without_a_stamp_is_not_corrected(model):
     assert isinstance(command.fault, StaleLoadError)
     assert "no stamp" in str(command.fault)
     assert command.theta.tolist() == THETA.tolist()
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_without_stamps_the_correction_fades_by_the_time_of_arrival(model, enabled):
+    driver = corrector(model)
+    added = [driver.settle().theta - THETA]
+    driver.stream.enabled = enabled
+    for i in range(1, 51):
+        came_ns = driver.stamp_ns + i * STEP
+        added.append(driver.stream.on_command(0, "", NAMES, THETA, (), came_ns).theta - THETA)
+    slew = EVERY_LOAD.safety.slew * STEP / SECOND
+    assert np.abs(np.diff(added, axis=0)).max() == pytest.approx(slew)
+    assert added[-1].tolist() == [0.0, 0.0]
+    driver.stamp_ns = came_ns
+    again = driver.send().theta - THETA
+    assert np.abs(again).max() <= slew + ROUNDING
+
+
+def test_a_load_in_another_frame_than_the_tare_is_no_known_load(model):
+    driver = corrector(model)
+    driver.stream.use_zero(Zero(Load(np.zeros(6)), np.zeros(6)))
+    driver.settle()
+    driver.stream.loads.add(driver.stamp_ns + STEP, "wrist_platform", DOWN[:3], DOWN[3:])
+    assert "another frame" in str(driver.send(load=None).fault)
+    told = driver.stream.supervision
+    assert (told.state, told.valid, told.text) == (State.UNSURE, False, NO_LOAD)
 
 
 def test_switching_off_fades_too(model):

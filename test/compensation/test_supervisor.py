@@ -239,8 +239,8 @@ def test_a_weight_that_grows_with_its_correction_is_a_contact_there(cell):
     cell.feel(20.0, ceiling)
     assert cell.states.count(State.HOLDING) == 1
     told = cell.supervisor.supervision
-    assert (told.payload, told.valid, told.text) == (None, False, module.CHANGES)
-    assert cell.feel(5.0, ceiling, THERE).text == module.CHANGES
+    assert (told.payload, told.valid, told.text) == (None, False, module.TOUCHED_HERE)
+    assert cell.feel(5.0, ceiling, THERE).text == module.TOUCHED_HERE
     assert cell.states.count(State.HOLDING) == 2
 
 
@@ -258,6 +258,17 @@ def test_a_correction_yields_to_what_works_against_it_until_the_command_leaves(c
     assert told.text == module.YIELDED
     assert cell.feel(2.0, NOTHING, HERE + 0.9 * REACH).share == 0.0
     assert cell.feel(2.0, NOTHING, HERE + 1.1 * REACH).valid
+
+
+def test_a_weight_where_a_contact_was_is_judged_once_the_command_has_moved(cell):
+    cell.feel(2.0, NOTHING)
+    cell.turn = np.array([0.0, -1e-3, 0.0])
+    assert cell.feel(1.0, np.array([0.2, 0.0, 0.0, 0.0, 0.01, 0.0])).share == 0.0
+    for theta in (HERE, HERE + 0.9 * REACH):
+        told = cell.feel(5.0, PART, theta)
+        assert (told.state, told.payload) == (State.UNSURE, None)
+        assert "once the command has moved by correction_limit_deg" in told.text
+    assert cell.feel(5.0, PART, HERE + 1.1 * REACH).valid
 
 
 def test_what_the_gripper_tells_counts_once_the_load_agrees(cell):

@@ -260,6 +260,7 @@ def test_parameters_are_checked_when_they_change(graph, corrector, model):
         ("correction_limit_deg", -1.0),
         ("frames", "{ft: {parent: moon}}"),
         ("motor_1_joint", "motor_2_joint"),
+        ("motor_1_joint", ""),
         ("enabled_on_start", False),
         ("load_age_limit_s", "long"),
     ):
@@ -280,6 +281,11 @@ def test_a_correction_beyond_the_limit_is_not_applied(graph, model_path):
     assert send_settled(graph, SECOND).position.tolist() == list(THETA)
     _, values = graph.status(NAME, lambda status, values: values["last fault"])
     assert "larger than the limit" in values["last fault"]
+    assert (values["load"], values["residual holds"]) == ("followed", "false")
+    assert not graph.heard["/pose_error_residual"]
+    node.set_parameters([Parameter("correction_limit_deg", value=5.0)])
+    send_settled(graph, SECOND + 2 * STEP)
+    graph.status(NAME, lambda status, values: values["residual holds"] == "true")
 
 
 def test_a_damaged_model_leaves_the_running_one_in_use(graph, corrector, model, tmp_path):

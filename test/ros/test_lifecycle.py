@@ -21,6 +21,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import save_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.ros import changes
 from wrist_stiffness.ros.angle_corrector import AngleCorrector
 from wrist_stiffness.ros.conversions import joint_message, time_message
 from wrist_stiffness.ros.model_monitor import ModelMonitor
@@ -116,6 +117,22 @@ def test_a_correction_fades_out_and_in_with_the_states(graph, corrector):
     assert np.abs(coming[0]).max() <= slew * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_correction_fades_out_with_commands_without_a_stamp(graph, corrector, enabled):
+    corrector.load()
+    assert corrector.enable().success
+    for _ in range(12):
+        corrector.send()
+    assert corrector.enable(enabled).success
+    assert corrector.node.stream.applied.any()
+
+    def passed():
+        graph.joints(COMMANDS, 0, THETA)
+        return graph.heard[SENT][-1].position.tolist() == list(THETA)
+
+    graph.until(passed, "command without a correction")
+
+
 def test_inactive_it_stops_where_it_is_told_to_once_the_correction_has_faded(graph):
     corrector = Corrector(graph, inactive_commands="stop")
     corrector.load()
@@ -186,7 +203,8 @@ def test_commands_are_answered_while_a_long_plan_is_corrected(graph, corrector):
 
 
 def test_a_tare_outlives_its_node_for_a_while(graph, tmp_path):
-    needed = {"state_folder": str(tmp_path), "tare_needed": True, "tare_age_limit_s": 60.0}
+    ages = {"tare_age_limit_s": 60.0, "load_age_limit_s": 60.0}
+    needed = {"state_folder": str(tmp_path), "tare_needed": True, **ages}
     node = graph.add(PoseErrorPredictor, **needed)
     status, values = graph.status("pose_error_predictor", lambda status, values: True)
     assert (status.level, status.message, values["tared"]) == (status.WARN, "not tared", "no")
@@ -200,8 +218,8 @@ def test_a_tare_outlives_its_node_for_a_while(graph, tmp_path):
     again = graph.add(PoseErrorPredictor, **needed)
     assert again.stream.loads.zero.load.wrench.tolist() == zero.tolist() == [0, 0, -2.0, 0, 0, 0]
     content = json.loads(kept.read_text())
-    for changes in ({"time_s": time.time() - 61.0}, {"time_s": time.time() + 9.0}, {"frames": "x"}):
-        kept.write_text(json.dumps(content | changes))
+    for other in ({"time_s": time.time() - 61.0}, {"time_s": time.time() + 9.0}, {"frames": "x"}):
+        kept.write_text(json.dumps(content | other))
         later = AngleCorrector(  # The name of the node is that of the file.
             context=graph.context,
             cli_args=["--ros-args", "-r", "__node:=pose_error_predictor"],
@@ -218,7 +236,7 @@ def test_all_nodes_change_or_none(graph, model, tmp_path):
     path = tmp_path / "model.yaml"
     save_model(model, path)
     nodes = [
-        graph.add(make, model_file=str(path), load_policy="follow")
+        graph.add(make, model_file=str(path), load_policy="follow", load_age_limit_s=60.0)
         for make in (AngleCorrector, PoseErrorPredictor, ModelMonitor)
     ]
     before = [node.stream.model for node in nodes]
@@ -248,9 +266,33 @@ def test_all_nodes_change_or_none(graph, model, tmp_path):
     assert "pose_error_predictor: " in refused.message
     assert "none.yaml" in refused.message
     assert [node.stream.model for node in nodes] == before
+    assert all(node.stream.loads.zero.load.wrench[2] == -2.0 for node in nodes)
     nodes[1].set_parameters([Parameter("model_file", value=str(path))])
     assert ask("reload_model").success
     assert all(len(node.stream.model.effects) == 1 for node in nodes)
+    new = [node.stream.model for node in nodes]
+    graph.load(SECOND + 1, frame_id="wrist_platform")
+    graph.until(lambda: all(node.stream.loads.newest_ns > SECOND for node in nodes), "loads")
+    assert "loads in wrist_base and in wrist_platform are mixed" in ask("tare").message
+    assert [node.stream.model for node in nodes] == new
+
+
+@pytest.mark.filterwarnings("ignore:failed to send response")
+def test_a_node_that_answers_too_late_keeps_the_change_before(graph, monkeypatch):
+    nodes = [
+        graph.add(make, load_age_limit_s=60.0, model_load_limit_s=0.1)
+        for make in (AngleCorrector, PoseErrorPredictor)
+    ]
+    graph.load(SECOND)
+    graph.until(lambda: all(node.stream.loads.newest_ns for node in nodes), "loads")
+    assert graph.call(Trigger, "/tare_all", Trigger.Request()).success
+    monkeypatch.setattr(changes, "LONGEST_ANSWER_S", 0.3)
+    graph.executor.remove_node(nodes[1])
+    refused = graph.call(SetBool, "/enable_all", SetBool.Request(data=False))
+    assert "pose_error_predictor: no answer within 0.4 s" in refused.message
+    graph.executor.add_node(nodes[1])
+    graph.until(lambda: nodes[1]._prepared is not None, "the late answer")
+    assert all(node.stream.loads.zero is not None for node in nodes)
 
 
 def test_two_wrists_live_side_by_side(graph, model_path):

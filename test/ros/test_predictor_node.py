@@ -164,12 +164,17 @@ def test_a_silent_load_stops_the_predictions_after_the_age_limit(graph, predicto
 
 
 def test_tare_makes_the_present_load_zero(graph, predictor, model):
-    refused = graph.call(Trigger, f"/{NAME}/tare", Trigger.Request())
-    assert not refused.success
-    assert "no load estimate" in refused.message
+    def tare(age_limit_s):
+        predictor.set_parameters([Parameter("load_age_limit_s", value=age_limit_s)])
+        answer = graph.call(Trigger, f"/{NAME}/tare", Trigger.Request())
+        return "" if answer.success else answer.message
+
+    assert "no load estimate has arrived" in tare(60.0)
     graph.load(SECOND)
     wait_for_load(graph, predictor, SECOND)
-    assert graph.call(Trigger, f"/{NAME}/tare", Trigger.Request()).success
+    assert tare(0.001).startswith("refused: no load estimate has arrived for ")
+    assert predictor.stream.loads.zero is None
+    assert tare(60.0) == ""
     graph.joints("/joint_states", SECOND)
     wait_for_predictions(graph, 1)
     assert numbers(predictions(graph)[0]) == expected(model, wrench=np.zeros(6))

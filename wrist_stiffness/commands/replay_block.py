@@ -232,7 +232,8 @@ class BlockReplay:
             if standard == topics.MOTOR_COMMANDS:
                 self.summary.commands += 1
                 frame_id = state.header.frame_id
-                command = self.correcting.on_command(int(stamps[0]), frame_id, *said)
+                time_ns = raw.log_time_ns
+                command = self.correcting.on_command(int(stamps[0]), frame_id, *said, time_ns)
                 answers = CorrectedBlock.of([command], 1)
                 others = [np.array([each]) for each in (state.velocity, state.effort) if each]
                 positions = command.positions[None]

@@ -33,6 +33,7 @@ class State(Enum):
     HOLDING = "holding"
     IN_CONTACT = "in contact"
     RELEASED = "released"
+    FOLLOWED = "followed"
 
 
 @dataclass(frozen=True)
@@ -111,12 +112,15 @@ LONGEST_STEP_S = 0.1
 NO_LOAD = "no load is known"
 NEW_WEIGHT = "a weight that was not there before is being judged"
 NO_WEIGHT = "the load is no weight: a contact, or the sensor is not tared"
-CHANGES = "the load changes with the correction: a contact"
+TOUCHED_HERE = (
+    "there was a contact at this place: the load is judged again once the command has moved by "
+    "correction_limit_deg"
+)
 
-TEXTS = ("", NO_LOAD, NEW_WEIGHT, NO_WEIGHT, CHANGES)
+TEXTS = ("", NO_LOAD, NEW_WEIGHT, NO_WEIGHT, TOUCHED_HERE)
 
 STATES = tuple(State)
-UNSURE, FREE, HOLDING, IN_CONTACT, RELEASED = range(len(STATES))
+UNSURE, FREE, HOLDING, IN_CONTACT, RELEASED, FOLLOWED = range(len(STATES))
 
 
 def _numbers(names: str) -> list[tuple[str, type[c_double]]]:

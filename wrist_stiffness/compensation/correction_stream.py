@@ -27,7 +27,7 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.stream import Stream
 from wrist_stiffness.compensation.supervisor import Supervisor
 from wrist_stiffness.compensation.trajectory_plan import PlanCorrector, PlannedPoint
-from wrist_stiffness.errors import InputError, LoadRangeError, StaleLoadError, WristError
+from wrist_stiffness.errors import InputError, LoadRangeError, WristError
 from wrist_stiffness.mechanism.compiled import (
     CompiledCommands,
     CompiledWrist,
@@ -116,15 +116,18 @@ class CorrectionStream(Stream):
         names: Sequence[str],
         positions: Sequence[float],
         velocities: Sequence[float] = (),
+        came_ns: int = 0,
     ) -> CorrectedCommand:
         """Correct a command.
 
-        `stamp_ns`: its stamp [ns].  `frame_id`: its header's frame; `wrist_corrected` marks a
-        command that was corrected already.  `names`, `positions`, `velocities`: as in
-        sensor_msgs/JointState [rad, rad/s]; speeds that are absent or not finite are taken as
-        differences of the angles.  Gives `CorrectedCommand`: with the fault, and on the way to no
-        correction, wherever one cannot be had safely.  Raises `InputError` if a motor is missing,
-        an angle is not finite or beyond the joint limits: such a command is not to be forwarded.
+        `stamp_ns`: its stamp [ns], 0 for none: no load belongs to it, and the correction fades out.
+        `frame_id`: its header's frame; `wrist_corrected` marks a command that was corrected
+        already.  `names`, `positions`, `velocities`: as in sensor_msgs/JointState [rad, rad/s];
+        speeds that are absent or not finite are taken as differences of the angles.  `came_ns`:
+        when it came [ns], the time of a command without a stamp.  Gives `CorrectedCommand`:
+        with the fault, and on the way to no correction, wherever one cannot be had safely.  Raises
+        `InputError` if a motor is missing, an angle is not finite or beyond the joint limits: such
+        a command is not to be forwarded.
         """
         theta = self._motor_angles(names, positions)
         theta_dot = self.settings.motors.speeds(names, velocities)
@@ -137,7 +140,7 @@ class CorrectionStream(Stream):
             fault = self._judged(stamp_ns, theta)[1] if self.correcting else None
             one = Corrected(np.zeros(2), None, fault, None)
         else:
-            one = self._corrected(self._running, stamp_ns, theta, theta_dot)
+            one = self._corrected(self._running, stamp_ns, theta, theta_dot, came_ns)
         driven = theta + one.delta
         forgotten = self._remember(stamp_ns, driven, one.load, theta_dot)
         sent = list(positions)
@@ -301,7 +304,12 @@ class CorrectionStream(Stream):
         return None
 
     def _corrected(
-        self, running: RunningModel, stamp_ns: int, theta: Array, theta_dot: Array | None
+        self,
+        running: RunningModel,
+        stamp_ns: int,
+        theta: Array,
+        theta_dot: Array | None,
+        came_ns: int,
     ) -> Corrected:
         """Correct one command: as a block of one, else in Python."""
         compiled, load = running.compiled, None
@@ -315,7 +323,7 @@ class CorrectionStream(Stream):
             if end == 1 and load is not None:
                 correction = correction_of(found, 0, running.model, load)
                 return Corrected(correction.delta, correction, None, load)
-        return self._searched(running, stamp_ns, theta, theta_dot, load)
+        return self._searched(running, stamp_ns, theta, theta_dot, load, came_ns)
 
     def _block_of_one(self, stamp_ns: int, theta: Array) -> CompiledCommands | None:
         """Return a command with its load, None where no load is known."""
@@ -360,23 +368,27 @@ class CorrectionStream(Stream):
         theta: Array,
         theta_dot: Array | None,
         load: Load | None,
+        came_ns: int = 0,
     ) -> Corrected:
         """Correct one command in Python, for a load that was judged or, if None, is to be."""
         fault: WristError | None = None
         if load is None and self.correcting:
             load, fault = self._judged(stamp_ns, theta)
         share, own = self.supervisor.share, self._corrector
-        one = own.searched(running, self.settings, stamp_ns, theta, theta_dot, load, share)
+        at_ns = stamp_ns or came_ns
+        one = own.searched(running, self.settings, at_ns, theta, theta_dot, load, share)
         return one._replace(fault=fault or one.fault)
 
     def _judged(self, stamp_ns: int, theta: Array) -> tuple[Load | None, WristError | None]:
         """Return the load to correct for, or why there is none."""
         try:
             _, measured = self.loads.at(stamp_ns)
+        except WristError as error:
+            self.supervisor.lost()
+            return None, error
+        try:
             load = self._load_for(stamp_ns, theta, measured)
         except WristError as error:
-            if isinstance(error, StaleLoadError):
-                self.supervisor.lost()
             return None, error
         if self.supervisor.stamps[1] == stamp_ns:
             # With another payload the hysteresis begins anew.

@@ -253,14 +253,16 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
     """Return the settings of the sample path, in SI units.
 
     `values`: parameters of `COMMON`, `PREDICTION` and `CORRECTION` by name; those that a node does
-    not have are at their defaults.  Raises `InputError` if both motors have the same name, the
+    not have are at their defaults.  Raises `InputError` if the motors have not two names, the
     frames cannot be read or a text is not among its choices.
     """
     entries = (*COMMON, *PREDICTION, *CORRECTION)
     values = {entry.name: entry.default for entry in entries} | dict(values)
     check_choices(entries, values)
-    if values["motor_1_joint"] == values["motor_2_joint"]:
-        raise InputError(f"motor_1_joint, motor_2_joint: both are {values['motor_1_joint']!r}")
+    motors = MotorNames(values["motor_1_joint"], values["motor_2_joint"])
+    first, second = motors.motor_1, motors.motor_2
+    if not first or not second or first == second:
+        raise InputError(f"motor_1_joint, motor_2_joint: {first!r}, {second!r} are not two names")
     for name in values["covariates"].split():
         if not COVARIATE.fullmatch(name):
             raise InputError(
@@ -272,7 +274,7 @@ def stream_settings(values: Mapping[str, Any]) -> StreamSettings:
     own = {name.removeprefix(prefix): sensor for name, sensor in sensors.items()}
     noise = np.repeat([values["load_force_noise_n"], values["load_moment_noise_nm"]], 3)
     return StreamSettings(
-        motors=MotorNames(values["motor_1_joint"], values["motor_2_joint"]),
+        motors=motors,
         frames=Frames(own, prefix),
         load_age_limit_s=values["load_age_limit_s"],
         signal_age_limit_s=values["signal_age_limit_s"],

@@ -11,6 +11,7 @@ it does not change with the motion, so there is no loop.
     in contact  a force or couple besides, that is no weight: corrected for the payload alone;
                 where that is not known any more the correction fades out
     released    the payload's load is gone: corrected for no load
+    followed    `load_policy` follow: nothing is judged, corrected for every load as it is measured
 
 A weight that stays the same for `SETTLE_S` becomes the payload, and its correction comes in slowly.
 That is the experiment that tells it from a contact: a weight does not mind a correction, the load
@@ -28,7 +29,7 @@ from collections.abc import Sequence
 
 from wrist_stiffness.compensation.belief import (
     CALM,
-    CHANGES,
+    FOLLOWED,
     FREE,
     HOLDING,
     IN_CONTACT,
@@ -44,6 +45,7 @@ from wrist_stiffness.compensation.belief import (
     SETTLE_S,
     STATES,
     TEXTS,
+    TOUCHED_HERE,
     UNSURE,
     YIELD_S,
     Belief,
@@ -58,7 +60,10 @@ from wrist_stiffness.mechanism.geometry import Geometry
 from wrist_stiffness.model.block import Load
 
 COMING_IN = "the correction is coming in"
-YIELDED = "the correction yielded to a contact, and comes back when the command leaves this place"
+YIELDED = (
+    "the correction yielded to a contact, and comes back once the command has moved by "
+    "correction_limit_deg"
+)
 
 TRUSTED = (FREE, HOLDING)
 UNKNOWN = (UNSURE, IN_CONTACT)
@@ -137,7 +142,7 @@ class Supervisor(Belief):
         """Take a load as it is measured for the payload."""
         self._begin(stamp_ns)
         self.trust, self.followed = 1.0, measured
-        self.state, self.is_against, self.sure = FREE, False, True
+        self.state, self.is_against, self.sure = FOLLOWED, False, True
 
     def judge(
         self,
@@ -282,7 +287,7 @@ class Supervisor(Belief):
         if self.state == IN_CONTACT and self.payload.known:
             if self.weight < 1.0:
                 self._drop_payload()
-                self.text = TEXTS.index(CHANGES)
+                self.text = TEXTS.index(TOUCHED_HERE)
             elif not self._stands_in(reading, limit):
                 self.payload.known = False
             self.sure = self.payload.known
@@ -310,7 +315,7 @@ class Supervisor(Belief):
         if expected is not None and not expected.explains(reading, limit, self.counts):
             expected = None
         if self.yielded:
-            self.text = TEXTS.index(CHANGES)
+            self.text = TEXTS.index(TOUCHED_HERE)
         elif not reading.is_weight(limit.times(CALM)):
             self.text = TEXTS.index(NO_WEIGHT)
         else:

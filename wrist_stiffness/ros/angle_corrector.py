@@ -127,6 +127,7 @@ class AngleCorrector(WristNode):
         self._task_residual = self.say(PoseWithCovarianceStamped, POSE_ERROR_RESIDUAL_TASK)
         self._plans = SlicedWork(self, self.on_fault)
         self._plan_known = "none"
+        self._residual_holds = False  # that of the last command
         self._paused_s = time.monotonic()
         for action, kind in (("tare", Trigger), ("reload_model", Trigger), ("enable", SetBool)):
             self.serve(kind, f"{action}_all", partial(self._on_all, action, kind))
@@ -170,13 +171,14 @@ class AngleCorrector(WristNode):
     def _on_command(self, joints: JointSample) -> None:
         self._require_forwarding("command", joints.stamp_ns)
         stamp_ns = joints.stamp_ns
-        command = self.stream.on_command(
-            stamp_ns, joints.frame_id, joints.names, joints.positions, joints.velocities
-        )
+        said = joints.names, joints.positions, joints.velocities
+        now_ns = self.get_clock().now().nanoseconds
+        command = self.stream.on_command(stamp_ns, joints.frame_id, *said, now_ns)
         positions = tuple(command.positions.tolist())
         sent = joints._replace(frame_id=command.frame_id, positions=positions)
         self._command.publish(joint_payload(sent))
         self._positions.publish(angles_payload(command.theta))
+        self._residual_holds = command.valid and command.fault is None
         if command.fault is not None:
             self.on_fault(command.fault)
             return
@@ -274,7 +276,7 @@ class AngleCorrector(WristNode):
             "payload [kg]": "none" if payload is None else f"{payload.mass_kg:.4f}",
             "payload told by the gripper": str(supervision.told).lower(),
             "another load departs by [N, N m]": f"{limit.force:.3g}, {limit.moment:.3g}",
-            "residual holds": str(supervision.valid).lower(),
+            "residual holds": str(self._residual_holds and supervision.valid).lower(),
             "trajectories under way": str(len(self._plans)),
             "load known all along the last trajectory": self._plan_known,
         }

@@ -7,7 +7,7 @@ or, with `false`, drops or undoes it.  `all_or_none` asks all nodes of a namespa
 from __future__ import annotations
 
 import time
-from collections.abc import Awaitable, Callable, Generator
+from collections.abc import Awaitable, Callable, Generator, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,9 +64,11 @@ async def all_or_none(
     paths = [path.removesuffix(ending) for path in paths]
     nodes = sorted(path for path in paths if path.rpartition("/")[0] + "/" == base)
 
-    async def ask(kind: type, suffix: str, asked: Any, limit_s: float) -> dict[str, str]:
-        """Ask all nodes at once; return what is wrong by node, and keep what is said."""
-        clients = {path: node.create_client(kind, f"{path}/{suffix}") for path in nodes}
+    async def ask(
+        some: Iterable[str], kind: type, suffix: str, asked: Any, limit_s: float
+    ) -> dict[str, str]:
+        """Ask nodes at once; return what is wrong by node, and keep what is said."""
+        clients = {path: node.create_client(kind, f"{path}/{suffix}") for path in some}
         try:
             ready = [client.service_is_ready for client in clients.values()]
             await until(lambda: all(each() for each in ready), LONGEST_ANSWER_S)
@@ -86,11 +88,13 @@ async def all_or_none(
         return wrong
 
     said: dict[str, str] = {}
-    wrong = await ask(service_type, f"{action}/{PREPARE}", request, longest_s + LONGEST_ANSWER_S)
+    prepare, limit_s = f"{action}/{PREPARE}", longest_s + LONGEST_ANSWER_S
+    wrong = await ask(nodes, service_type, prepare, request, limit_s)
     if not wrong:
-        wrong = await ask(SetBool, COMMIT, SetBool.Request(data=True), LONGEST_ANSWER_S)
+        wrong = await ask(nodes, SetBool, COMMIT, SetBool.Request(data=True), LONGEST_ANSWER_S)
     if wrong:
-        await ask(SetBool, COMMIT, SetBool.Request(data=False), LONGEST_ANSWER_S)
+        # The others have nothing to undo but an earlier change, which stays.
+        await ask(said, SetBool, COMMIT, SetBool.Request(data=False), LONGEST_ANSWER_S)
         raise InputError(f"nothing has changed: {_lines(wrong, base)}")
     return _lines(said, base)
 

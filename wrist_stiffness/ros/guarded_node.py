@@ -206,8 +206,9 @@ class GuardedNode(LifecycleNode):
             return change.said
 
         async def first_step(request: Any) -> str:
-            # Instead of any other.
-            self._prepared, self._undo = await prepared(request), None
+            # Instead of any other, which stays as it is even if this one is refused.
+            self._prepared = self._undo = None
+            self._prepared = await prepared(request)
             return self._prepared.said
 
         self.serve(service_type, f"~/{action}", at_once)

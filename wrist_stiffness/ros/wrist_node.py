@@ -241,6 +241,10 @@ class WristNode(GuardedNode, ABC):
         """
         if self.state != ACTIVE:
             raise InputError(f"refused: the node is {self.state}, not active")
+        self.require_loads()
+
+    def require_loads(self) -> None:
+        """Refuse what needs loads that arrive (raises InputError)."""
         limit_s = self.stream.settings.load_age_limit_s
         if self._load_heard_s is None:
             raise InputError("refused: no load estimate has arrived")
@@ -259,6 +263,7 @@ class WristNode(GuardedNode, ABC):
 
     def _tare_change(self) -> Change:
         self.require_configured()
+        self.require_loads()
         zero = self.stream.loads.measured_zero(self.stream.settings.supervisor.limit)
         frames = self.get_parameter("frames").value
         new = Tare(zero, time.time(), frames)

@@ -2,8 +2,8 @@
  * `compensation/supervisor.py`, with `belief.py` and `payload.py`; to the bit. */
 #include "wrist.h"
 
-enum { UNSURE, FREE, HOLDING, IN_CONTACT, RELEASED };
-enum { NO_TEXT, NO_LOAD, NEW_WEIGHT, NO_WEIGHT, CHANGES };
+enum { UNSURE, FREE, HOLDING, IN_CONTACT, RELEASED, FOLLOWED };
+enum { NO_TEXT, NO_LOAD, NEW_WEIGHT, NO_WEIGHT, TOUCHED_HERE };
 
 typedef struct {
     double force, moment;
@@ -146,7 +146,7 @@ static void feel(const Rules *r, Belief *s, const double theta[2], const Reading
     if (s->state != IN_CONTACT || !s->payload.known) return;
     if (s->weight < 1.0) {
         drop_payload(s);
-        s->text = CHANGES;
+        s->text = TOUCHED_HERE;
     } else if (!stands(r, &s->payload, load, limit)) {
         s->payload.known = 0.0;
     }
@@ -165,7 +165,7 @@ static void weigh(const Rules *r, Belief *s, const Reading *load, Thresholds lim
     Estimate expected = s->expected;
     const int agrees = expected.known && explains(r, &expected, load, limit, s->counts);
     if (s->yielded) {
-        s->text = CHANGES;
+        s->text = TOUCHED_HERE;
     } else if (!is_weight(load, times(limit, r->calm))) {
         s->text = NO_WEIGHT;
     } else {
@@ -182,7 +182,7 @@ void begin_judging(const Rules *r, Belief *s, int64_t stamp_ns, int64_t at_ns[2]
     s->step_s = stamp_ns > last_ns ? smaller((double)(stamp_ns - last_ns) / 1e9, r->longest_step_s) : 0.0;
     s->trust = r->trust;
     if (!r->follow) return;
-    s->state = FREE;
+    s->state = FOLLOWED;
     s->is_against = 0.0;
     s->sure = 1.0;
 }
