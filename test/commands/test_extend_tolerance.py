@@ -14,8 +14,8 @@ from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import calibrate
-from wrist_stiffness.identification.extension import _require_new
-from wrist_stiffness.identification.free_effects import commissioning, unfitted
+from wrist_stiffness.identification.extension import base_beside
+from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
@@ -113,10 +113,9 @@ def test_a_finding_that_was_taken_out_again_may_be_added_again():
     step = Step("extend", "2026-01-01", "ab" * 32, {}, added=SOFT)
     model = replace(load_model(SHIPPED), lineage=(step,))
     soft = effect(SOFT).with_values({"flexibility_percent": SOFTER_PERCENT})
-    free, _ = commissioning(model)
-    _require_new(model, effect(SOFT), free)
+    base_beside(model, effect(SOFT), ())
     with pytest.raises(InputError, match=f"{SOFT}: the model has it already"):
-        _require_new(model.with_effects(soft), effect(SOFT), free)
+        base_beside(model.with_effects(soft), effect(SOFT), ())
 
 
 @pytest.mark.parametrize("name", ["encoder_offset@motor_1", "load_bias@load_sensor"])
