@@ -27,7 +27,13 @@ from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.noise import KNOWN, unstated
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.projection import low_rank
-from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance, with_shared
+from wrist_stiffness.inference.shared import (
+    LAW_RANK,
+    Whitened,
+    as_they_stood,
+    own_covariance,
+    with_shared,
+)
 from wrist_stiffness.inference.smooth import by_session
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.sessions.unit_session import UnitSession
@@ -64,13 +70,15 @@ class WristTable(Whitened):
         slow = np.concatenate(
             [np.broadcast_to(s.drift, (len(s), len(s.drift)))[s.measured] for s in sessions]
         )
-        if left.covariance is None:
-            base = columns if left.common is None else np.concatenate([columns, left.common], 2)
+        base = columns if left.common is None else np.concatenate([columns, left.common], 2)
+        stated = left.covariance
+        if stated is None:
             left, usual, width = unstated(left, base, smooth_columns(left))
             own = own_covariance(left, with_shared(left, np.diag(usual)))
         else:
+            left = as_they_stood(left, base, smooth_columns(left))
             # A drift that is stated has columns of its own.
-            own = own_covariance(left, left.covariance) - slow[:, :, None] ** 2 * each_its_own
+            own = own_covariance(left, stated) - slow[:, :, None] ** 2 * each_its_own
             width = KNOWN
         variance: Array = np.diagonal(own, axis1=1, axis2=2)
         self._scatter = variance
