@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.inference.observations import Observations
-from wrist_stiffness.inference.shared import Apart, Whitened, component_factors, own_covariance
+from wrist_stiffness.inference.shared import (
+    Apart,
+    Whitened,
+    as_they_stood,
+    component_factors,
+    own_covariance,
+)
 
 STAND = np.array([0, 0, -1, 1, 1, 1, -1])
 
@@ -87,3 +93,25 @@ def test_units_that_are_taken_out_leave_the_others_as_if_never_measured(table):
     assert white.T @ white == pytest.approx(exact, rel=1e-9)
     one = columns[:, :, 0]
     assert taken(units.whiten(one)) == pytest.approx(white[:, 0])
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.1, 1.0])
+def test_how_much_motors_moved_within_a_count_is_told_by_what_units_of_a_stand_show(moved):
+    """Forty stands of three units each, of which the load pushes the last, in two sessions."""
+    rng = np.random.default_rng(7)
+    stand, session = np.repeat(np.arange(40), 3), np.repeat([0, 1], 60)
+    shared = np.broadcast_to(rng.normal(size=(3, 2)), (120, 3, 2))
+    share = np.where(session == 1, moved, 0.0)[:, None]
+    hidden = np.sqrt(1.0 - share) * rng.normal(size=(40, 2))[stand]
+    hidden += np.sqrt(share) * rng.normal(size=(120, 2))
+    load = np.tile([0.0, 0.0, 1.0], 40)[:, None, None] * np.eye(3)
+    values = (shared @ hidden[:, :, None] + load @ [[9.0], [-5.0], [2.0]])[:, :, 0]
+    values += rng.normal(0.0, 0.1, (120, 3))
+    covariance = shared @ np.swapaxes(shared, 1, 2) + 0.01 * np.eye(3)
+    table = Observations(values, {}, covariance, session=session, stand=stand, shared=shared)
+    found = as_they_stood(table, np.zeros((120, 3, 0)), load).shared
+    own = 1.0 - np.sum(found**2, axis=(1, 2)) / np.sum(shared**2, axis=(1, 2))
+    assert own[:60] == pytest.approx(0.0)
+    # To one step of the shares that are tried.
+    assert own[60:].min() >= moved / 3.5
+    assert own[60:].max() <= 3.5 * moved

@@ -8,6 +8,7 @@ import pytest
 
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.identification.calibration import calibrate
+from wrist_stiffness.inference.shared import own_covariance
 from wrist_stiffness.sessions.observing import tabulate
 from wrist_stiffness.sessions.reading.session import read_session
 from wrist_stiffness.sessions.unit_session import all_units, as_units
@@ -52,6 +53,21 @@ def test_units_of_an_instrument_without_scatter_can_be_weighed(model, session):
         shift[still.label == unit] = shift[still.label == unit][0]
     observed = tabulate(model, all_units(model, [replace(session, shift=shift)]))
     np.linalg.cholesky(observed.observations.covariance)
+
+
+def test_no_measurement_is_better_than_the_table_it_is_compared_with(model, session):
+    """Poses that differ in the rounding of numbers alone have no noise of that size."""
+    still, jitter = as_units(model, session).cut, np.random.default_rng(0)
+    shift = session.shift.copy()
+    for unit in np.flatnonzero(still.dwell):
+        shift[still.label == unit] = shift[still.label == unit][0]
+    shift += 1e-17 * jitter.standard_normal(shift.shape)
+    units = as_units(model, replace(session, shift=shift))
+    assert units.white[:3].tolist() == [0.0, 0.0, 0.0]
+    observations = tabulate(model, (units,)).observations
+    own = np.diagonal(own_covariance(observations, observations.covariance), axis1=1, axis2=2)
+    # 0.3 % of a deflection of a few micrometres.
+    assert 1e-9 < np.sqrt(own[:, :3]).min() < 1e-7
 
 
 @pytest.fixture(scope="module")

@@ -175,11 +175,11 @@ def test_loads_are_moved_to_O_as_the_nodes_move_them(tmp_path, campaign, table):
     assert session.block.load_on_platform
 
 
-def test_loads_in_F_and_in_U_do_not_mix(tmp_path, campaign):
+def test_loads_in_F_and_in_U_do_not_mix(tmp_path, campaign, table):
     campaign.with_joints().with_loads().with_loads("wrist_platform").with_poses()
     samples = read_samples(open_recording(campaign.written(tmp_path / "bag")))
     with pytest.raises(FrameError, match="wrist_base, wrist_platform are mixed"):
-        machine_signals(samples, Frames())
+        machine_signals(samples, Frames(), table)
 
 
 def test_temperatures_and_covariates_are_held(tmp_path, campaign, complete, table):

@@ -227,6 +227,20 @@ def test_a_motor_that_moves_into_a_long_pause_has_no_angles_in_it():
         assert (machine.usable(poses)[0] == known).all()
 
 
+def test_motors_that_stand_still_and_jump_are_where_their_angles_are(tmp_path, campaign, table):
+    """Each second command comes late, and the platform stands still meanwhile as the motors do."""
+    moment = campaign.joint_ns[np.arange(800) // 2 * 2]
+    jumping = campaign.theta(moment)
+    campaign.theta = lambda time_ns: jumping
+    campaign.with_joints()
+    del campaign.theta
+    campaign.with_loads().with_poses(rotation=campaign.rigid(moment), stamps=campaign.joint_ns)
+    session = read_session(campaign.written(tmp_path / "bag"), table)
+    rows = np.searchsorted(1e-9 * campaign.joint_ns, session.block.time - 1e-3)
+    np.testing.assert_allclose(session.block.theta, jumping[rows], atol=1e-12)
+    assert not any("sent more often" in remark for remark in session.remarks)
+
+
 def test_speeds_of_repeated_angles_are_taken_when_they_were_read(tmp_path, campaign, table):
     """A driver that repeats its angles repeats their speeds with them."""
     read = campaign.joint_ns[np.arange(800) // 10 * 10]

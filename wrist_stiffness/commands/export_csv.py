@@ -83,7 +83,7 @@ def export_csv(
     source, samples, known = opened(recording, remaps or {}, settings)
     notes, _ = notes_of(samples.notes)
     try:
-        machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
+        machine = machine_signals(samples, known.frames, table, settings.load_age_limit_s)
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
             time_ns, measured, names, markers = _measured(samples, known.frames)
             gauges: tuple[str, ...] = ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,16 +28,52 @@ from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.noise import KNOWN, unstated
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.projection import low_rank
-from wrist_stiffness.inference.shared import LAW_RANK, Whitened, own_covariance, with_shared
+from wrist_stiffness.inference.shared import (
+    LAW_RANK,
+    Whitened,
+    as_they_stood,
+    own_covariance,
+    with_shared,
+)
 from wrist_stiffness.inference.smooth import by_session
-from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.mechanism.components import MOTORS, Array
+from wrist_stiffness.sessions.observing import counts_known
 from wrist_stiffness.sessions.unit_session import UnitSession
 
 
 def likelihood_of(base: BaseFit, lost: int = 0) -> WristTable:
     """Return the likelihood of the units of a fit; so many more were lost."""
-    left = base.problem.table.with_values(base.residual)
-    return WristTable(left, base.problem.sessions, base.columns, lost=lost)
+    return WristTable(_left(base), base.problem.sessions, base.columns, lost=lost)
+
+
+def _left(base: BaseFit) -> Observations:
+    """Return what a fit leaves of the units, which hidden counts change as wrong zeros do.
+
+    A turn about a motor's axis is a shift too where the instrument's frame is not quite F.
+    """
+    problem = base.problem
+    left = problem.table.with_values(base.residual)
+    if left.shared is None:
+        return left
+    step = problem.model.table.geometry.limits.encoder_step
+    known = problem.rows([counts_known(each.cut, step) for each in problem.sessions])
+    shared = left.shared.copy()
+    for place, motor in enumerate(MOTORS):
+        slope = np.zeros(left.values.shape)
+        for number, unknown in enumerate(problem.unknowns):
+            if unknown.effect.name == f"encoder_offset@{motor}":
+                turn = np.radians(1e-3 * unknown.step)
+                slope += np.nan_to_num(base.columns[:, :, number]) / turn
+        zeroed = slope.any(axis=1)
+        shared[zeroed, :, place] = (step / np.sqrt(12.0 * known[:, [place]]) * slope)[zeroed]
+    covariance = left.covariance
+    if covariance is not None:
+        covariance = covariance - _product(left.shared) + _product(shared)
+    return replace(left, shared=shared, covariance=covariance)
+
+
+def _product(columns: Array) -> Array:
+    return np.asarray(columns @ np.swapaxes(columns, -1, -2))
 
 
 class WristTable(Whitened):
@@ -64,13 +101,15 @@ class WristTable(Whitened):
         slow = np.concatenate(
             [np.broadcast_to(s.drift, (len(s), len(s.drift)))[s.measured] for s in sessions]
         )
-        if left.covariance is None:
-            base = columns if left.common is None else np.concatenate([columns, left.common], 2)
+        base = columns if left.common is None else np.concatenate([columns, left.common], 2)
+        stated = left.covariance
+        if stated is None:
             left, usual, width = unstated(left, base, smooth_columns(left))
             own = own_covariance(left, with_shared(left, np.diag(usual)))
         else:
+            left = as_they_stood(left, base, smooth_columns(left))
             # A drift that is stated has columns of its own.
-            own = own_covariance(left, left.covariance) - slow[:, :, None] ** 2 * each_its_own
+            own = own_covariance(left, stated) - slow[:, :, None] ** 2 * each_its_own
             width = KNOWN
         variance: Array = np.diagonal(own, axis1=1, axis2=2)
         self._scatter = variance

@@ -6,16 +6,21 @@ counts would both drown what a load does and make the mean look too good.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.evidence import Evidence
+from wrist_stiffness.inference.noise import rich_basis
 from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations
 
 LAW_RANK = 8
 """Columns of the error of one law."""
+
+OWN_SHARES = np.geomspace(3e-3, 1.0, 6)
+"""Shares of the variance of a hidden count that may be a unit's own within a stand: motors move."""
 
 
 def own_covariance(observations: Observations, covariance: Array) -> Array:
@@ -83,6 +88,12 @@ class Apart:
             flat -= directions @ (shrink * (directions.T @ flat))
         return white
 
+    @property
+    def log_density(self) -> float:
+        """Logarithm of the density of numbers whose rows are zero, up to what all share."""
+        own = np.log(np.diagonal(self._factors, axis1=1, axis2=2)).sum()
+        return float(own + sum(np.log1p(-shrink).sum() for _, shrink in self._parts))
+
     def undone(self, white: Array) -> Array:
         """Return the columns (n, m, k) that became these."""
         flat = white.reshape(white.shape[0] * white.shape[1], white.shape[2]).copy()
@@ -96,6 +107,41 @@ class Apart:
         white = self(np.where(self._measured[:, :, None], np.nan_to_num(columns), 0.0))
         flat = white.reshape(self._measured.size, columns.shape[2])
         return flat if values.ndim == 3 else flat[:, 0]
+
+
+def as_they_stood(observations: Observations, base: Array, structure: Array) -> Observations:
+    """Return the units with as much shared in each session as is likeliest.
+
+    Motors that are corrected at rest move by less than a count, and no encoder shows it.  What is
+    compared is what a rich model leaves of the units: a load does the same to both.
+
+    `observations`: unchanged where nothing states their noise; `base` (n, m, p), `structure`
+    (n, m, q): columns of what is refitted, and of what else could be behind the values.
+    """
+    covariance = observations.covariance
+    if covariance is None or observations.shared is None or observations.stand is None:
+        return observations
+    columns = np.concatenate([base, structure, observations.values[:, :, None]], axis=2)
+
+    def log_likelihood(units: Observations) -> float:
+        own = own_covariance(units, covariance)
+        apart = Apart(units, component_factors(own, units.measured))
+        rows, p = apart.rows(columns), base.shape[2]
+        basis = rich_basis(rows[:, :p], rows[:, p:-1], int(units.measured.sum()))
+        left = rows[:, -1] - basis @ (basis.T @ rows[:, -1])
+        return apart.log_density - 0.5 * float(left @ left)
+
+    best, whole = log_likelihood(observations), observations.shared
+    for session in np.unique(observations.sessions[observations.stand >= 0]):
+        here = (observations.sessions == session)[:, None, None]
+        for own in OWN_SHARES:
+            shared = np.where(here, np.sqrt(1.0 - own) * whole, observations.shared)
+            moved = replace(observations, shared=shared)
+            found = log_likelihood(moved)
+            if found <= best:
+                break
+            observations, best = moved, found
+    return observations
 
 
 def _shrink(size: Array) -> Array:

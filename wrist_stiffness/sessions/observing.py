@@ -131,14 +131,20 @@ def _covariates(sessions: tuple[UnitSession, ...]) -> dict[str, Array]:
 
 
 def _covariance(sessions: tuple[UnitSession, ...], counts: Array) -> Array | None:
-    """Return the covariance of each unit on its own: white noise and the hidden encoder count."""
+    """Return the covariance of each unit on its own: white noise and the hidden encoder count.
+
+    No measurement is better than what it is compared with.
+    """
     white = np.stack([each.white for each in sessions])
     seen = np.concatenate([each.values for each in sessions])
     if np.isnan(white[:, np.isfinite(seen).any(axis=0)]).any():
         return None
     own = np.concatenate(
         [
-            np.nan_to_num(each.white, nan=1.0) ** 2 / each.samples[:, None] + each.wander**2
+            np.maximum(
+                np.nan_to_num(each.white, nan=1.0) ** 2 / each.samples[:, None] + each.wander**2,
+                each.table_error**2,
+            )
             for each in sessions
         ]
     )

@@ -61,6 +61,8 @@ class UnitSession:
     drift: Array
     # (m,), what its digits hide, where they hide the white scatter; else 0 [m, rad]
     digits: Array
+    # (m,), what finite rotations leave of the model, which no tolerance takes up [m, rad]
+    table_error: Array
     gauges: Gauges | None = None  # what read them, in place of a sensor of poses: m is K, else 6
 
     def __len__(self) -> int:
@@ -263,8 +265,26 @@ def as_units(model: ErrorModel, session: MeasuredSession) -> UnitSession:
         white,
         drift,
         digits,
+        _table_error(model, parts.block, session.gauges, quantities),
         session.gauges,
     )
+
+
+def _table_error(
+    model: ErrorModel, block: Block, gauges: Gauges | None, quantities: Sequence[Quantity]
+) -> Array:
+    """Return what the table states of finite rotations, of what is seen of the deflection, (m,).
+
+    Mesh and contact make a wrist softer or stiffer, which tolerances take up.
+    """
+    seen = model.with_effects().batch(block).twist
+    if gauges is not None:
+        seen = gauges.predicted(seen, block.theta)
+    square = np.mean(seen**2, axis=0)
+    for at in (list(each.components) for each in quantities):
+        square[at] = square[at].mean()
+    relative = model.table.header.errors.get("second_order_relative", 0.0)
+    return np.asarray(relative * np.sqrt(square))
 
 
 def _means(values: Array, label: Labels, units: int) -> tuple[Array, Array]:
@@ -313,6 +333,7 @@ def _steps(values: Array, label: Labels, parts: Cut) -> list[Array]:
     """Return the steps between neighbours in dwells, for each component those that were seen."""
     inside = (label[1:] == label[:-1]) & (label[1:] >= 0) & parts.dwell[label[1:]]
     step = np.abs(np.diff(values, axis=0)[inside])
+    step[step < FINEST] = 0.0
     return [each[np.isfinite(each)] for each in step.T]
 
 
@@ -333,7 +354,7 @@ def _rounding(steps: Sequence[Array], quantities: Sequence[Quantity]) -> Array:
     Shifts share their digits, and so do turns: in a component that never changes none shows.
     """
     smallest = [np.min(each, initial=np.inf, where=each > 0.0) for each in steps]
-    digit = np.where(np.isfinite(smallest), np.maximum(smallest, FINEST), FINEST)
+    digit = np.where(np.isfinite(smallest), smallest, FINEST)
     for at in (list(each.components) for each in quantities):
         digit[at] = digit[at].max()
     return digit / np.sqrt(12.0)

@@ -10,7 +10,9 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.load_history import NANOSECONDS
+from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.sessions.in_pieces import rigid_rotation
 from wrist_stiffness.sessions.reading.signals import Signal, Stamps
 
 Rows = NDArray[np.intp] | slice
@@ -22,6 +24,9 @@ STEPS = 1200
 """Offsets tried on either side before the best one is refined."""
 
 STAMPS_USED = 1000
+
+ANGLES_USED = 20_000
+"""Joint states that are enough to tell the offset of the clocks."""
 
 SCANNED, LIKELY = 200, 100
 """Of these stamps, evenly spread, so many try every offset; the offsets that suit them best are
@@ -131,6 +136,14 @@ class _Motion:
 
 
 TRIED_S = np.linspace(-SEARCHED_S, SEARCHED_S, 2 * STEPS + 1)
+
+
+def rigid_motion(angles: Signal, table: Table) -> Signal:
+    """Return the rotations of the rigid wrist, of as many joint states as tell clocks apart."""
+    every = max(1, len(angles) // ANGLES_USED)
+    theta, time_ns = angles.values[::every], angles.time_ns[::every]
+    reachable = table.mechanism.reachable(theta)
+    return Signal(time_ns[reachable], rigid_rotation(table, theta[reachable]))
 
 
 def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset | None:

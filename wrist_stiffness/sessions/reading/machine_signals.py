@@ -7,15 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.compensation.intake import Frames
 from wrist_stiffness.compensation.load_history import NANOSECONDS
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import FrameError, InputError
+from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.places import THERMOMETERS
-from wrist_stiffness.recording.samples import JointSamples, Samples, ScalarSamples, WrenchSamples
+from wrist_stiffness.recording.samples import (
+    JointSamples,
+    PoseSamples,
+    Samples,
+    ScalarSamples,
+    WrenchSamples,
+)
+from wrist_stiffness.sessions.reading.clocks import clock_offset, rigid_motion
 from wrist_stiffness.sessions.reading.joint_states import (
     DENSE_S,
     fault_of,
@@ -23,6 +32,7 @@ from wrist_stiffness.sessions.reading.joint_states import (
     without_held,
     without_wild,
 )
+from wrist_stiffness.sessions.reading.pose_track import measured_components
 from wrist_stiffness.sessions.reading.signals import (
     Signal,
     Stamps,
@@ -141,10 +151,14 @@ class MachineSignals:
 
 
 def machine_signals(
-    samples: Samples, frames: Frames, load_age_limit_s: float = StreamSettings.load_age_limit_s
+    samples: Samples,
+    frames: Frames,
+    table: Table,
+    load_age_limit_s: float = StreamSettings.load_age_limit_s,
 ) -> MachineSignals:
     """Return the signals of a recording, loads moved to O.
 
+    `table`: its rigid wrist tells whether the measured poses stand still where angles repeat.
     Gives `MachineSignals`: values that are not finite are left out.  Raises `FrameError` if loads
     are in an unknown frame, or some in F and some in U; `InputError` if no angle or no load is
     finite.
@@ -154,7 +168,7 @@ def machine_signals(
     twice = set_back(samples.joints.time_ns) or mixed(recorded)
     twice = (*twice, *set_back(samples.loads.time_ns))
     recorded, loads = (each.take(~in_any(twice, each.time_ns)) for each in (recorded, loads))
-    read, held_s = without_held(recorded)
+    read, held_s = _as_read(recorded, samples.poses, table)
     angles, wild = without_wild(read)
     if len(angles) == 0:
         raise InputError("no joint state has finite angles")
@@ -216,6 +230,25 @@ def _loads(loads: WrenchSamples, frames: Frames) -> tuple[Signal, bool]:
             f"loads: frames {', '.join(on_platform)} are mixed; some turn with the platform"
         )
     return in_order(loads.time_ns, wrench), any(on_platform.values())
+
+
+def _as_read(recorded: Signal, poses: PoseSamples, table: Table) -> tuple[Signal, float]:
+    """Return angles without repetitions, as `without_held`; all where poses move as all of them.
+
+    Motors whose commands come late stand still and jump: then the platform did so too.
+    """
+    read, held_s = without_held(recorded)
+    _, quaternion = measured_components(poses)
+    if held_s and np.isfinite(quaternion).any():
+        turned = in_order(poses.time_ns, quaternion)
+        rotation = Rotation.from_quat(turned.values).as_matrix()
+        sent, once = (
+            clock_offset(turned.time_ns, rotation, rigid_motion(angles, table))
+            for angles in (recorded, read)
+        )
+        if sent is not None and once is not None and sent.misfit <= once.misfit:
+            return recorded, 0.0
+    return read, held_s
 
 
 def _told_speeds(

@@ -28,7 +28,13 @@ from wrist_stiffness.recording.reader import Recording
 from wrist_stiffness.recording.samples import Samples
 from wrist_stiffness.sessions.in_pieces import in_pieces, rigid_rotation
 from wrist_stiffness.sessions.measured_session import MeasuredSession, beyond_range
-from wrist_stiffness.sessions.reading.clocks import ClockOffset, ClockStep, clock_offset, clock_step
+from wrist_stiffness.sessions.reading.clocks import (
+    ClockOffset,
+    ClockStep,
+    clock_offset,
+    clock_step,
+    rigid_motion,
+)
 from wrist_stiffness.sessions.reading.gauge_readings import gauge_readings, held_to
 from wrist_stiffness.sessions.reading.lost_beams import lost_beams, stood_still
 from wrist_stiffness.sessions.reading.machine_signals import MachineSignals, machine_signals
@@ -46,9 +52,6 @@ from wrist_stiffness.sessions.reading.static_frames import KnownFrames, frames_o
 
 GEOMETRY = "geometry_sha256"
 """Key of the notes: checksum of the geometry file of the wrist that was recorded."""
-
-ANGLES_USED = 20_000
-"""Joint states that are enough to tell the offset of the clocks."""
 
 OWN_CLOCK_S = 0.2
 """A larger offset is another clock and is taken out; a smaller one is the effect `time_delay`."""
@@ -98,7 +101,7 @@ def read_session(
     recording, samples, known = opened(path, remaps or {}, settings)
     notes, unread = notes_of(samples.notes)
     try:
-        machine = machine_signals(samples, known.frames, settings.load_age_limit_s)
+        machine = machine_signals(samples, known.frames, table, settings.load_age_limit_s)
         if len(samples.poses.time_ns) or len(samples.markers.time_ns):
             track = pose_track(samples, table.geometry.platform.readout_points, known.frames)
         else:
@@ -149,7 +152,7 @@ def session_of(
     require_overlap(machine.angles.time_ns, track.time_ns)
     recorded = len(track)
     track = track.take(~in_any(machine.twice, track.time_ns))
-    motion = _rigid_motion(machine, table)
+    motion = rigid_motion(machine.angles, table)
     track = _without_still(machine, track, table, motion)
     track, offset = _by_one_clock(machine, track, motion)
     remarks, late_s = [*machine.remarks, *track.remarks], 0.0
@@ -320,14 +323,6 @@ def _spread(values: Array, rows: NDArray[np.intp], count: int) -> Array:
     out = np.full((count, *values.shape[1:]), np.nan)
     out[rows] = values
     return out
-
-
-def _rigid_motion(machine: MachineSignals, table: Table) -> Signal:
-    """Return the rotations of the rigid wrist, of as many joint states as tell clocks apart."""
-    every = max(1, len(machine.angles) // ANGLES_USED)
-    theta, time_ns = machine.angles.values[::every], machine.angles.time_ns[::every]
-    reachable = table.mechanism.reachable(theta)
-    return Signal(time_ns[reachable], rigid_rotation(table, theta[reachable]))
 
 
 def _by_one_clock(
