@@ -5,7 +5,7 @@ from wrist_stiffness.errors import InputError, UnreachablePoseError
 from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.simulation.catalogue import HiddenEffect
-from wrist_stiffness.simulation.cell import CellSettings, Drive, VirtualCell, true_laws
+from wrist_stiffness.simulation.cell import CellSettings, VirtualCell, true_laws
 from wrist_stiffness.simulation.instrument import WILD_SHIFT
 
 RATE = 50.0
@@ -138,19 +138,6 @@ def test_motors_follow_what_is_sent_not_the_program(wrist):
     sample = cell.step(0.0, corrected)
     step = cell.table.geometry.limits.encoder_step
     assert np.max(np.abs(sample.encoder - corrected)) <= step
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_motor_at_rest_stays_where_it_is_while_less_than_half_a_count_is_asked_of_it(seed):
-    """A correction that follows a noisy load asks for a hundredth of a count, back and forth."""
-    step, time_s = 1e-3, 0.01 * np.arange(400)
-    drive, asked = Drive(step, rng(seed)), 0.3 * np.minimum(time_s, 1.0)[:, None] * [1.0, -1.0]
-    asked += 0.01 * step * rng(seed).standard_normal(asked.shape)
-    shaft = drive.shaft(time_s, asked)
-    assert np.abs(shaft - asked).max() <= 0.5 * step + COUNT_ROUNDING
-    moved = np.diff(shaft[120:], axis=0) != 0.0
-    # Rarely it lies at the very edge of the half count.
-    assert np.mean(moved) < 0.1
 
 
 def test_told_speeds_add_up_to_the_way_of_the_program(wrist):

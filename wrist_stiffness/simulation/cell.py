@@ -73,15 +73,13 @@ class Drive:
     """Both motors with their position loops and encoders.
 
     A loop is satisfied as soon as the shaft lies within half a count of what was sent: where it
-    stops there differs from move to move, and no encoder shows it.  As long as it lies there, what
-    is sent may change: a shaft at rest stays where it is.
+    stops there differs from move to move, and no encoder shows it.
 
     `step`: encoder step [rad]; `rng`: belongs to the drive alone.
     """
 
     SETTLING_S = 0.1
-    """Time constant with which a moving shaft goes to another place within the count, and for which
-    it follows what is sent after the last half count."""
+    """Time constant with which the shaft goes to another place within the count."""
 
     SPEED_UNIT = float(np.radians(0.01))
     """In which a drive tells its speed [rad/s]."""
@@ -89,29 +87,26 @@ class Drive:
     def __init__(self, step: float, rng: np.random.Generator) -> None:
         self._step = step
         self._rng = rng
-        self._time_s = -np.inf
-        self._moved_s = np.full(2, -np.inf)  # when what was sent last went on by half a count
-        self._moved_to = np.zeros(2)  # to where
-        self._goal = self._rest = np.zeros(2)
-        self._shaft = np.full(2, np.inf)
+        self._time_s: float | None = None
+        self._sent = np.zeros(2)
+        self._moving = np.zeros(2, dtype=bool)
+        self._goal = self._draw()
+        self._rest = self._goal
 
     def shaft(self, time_s: Array, sent: Array) -> Array:
         """Return the shaft angles (n, 2) for the next n times (n,) [s] and angles sent [rad]."""
         out = np.empty_like(sent)
-        for i, (now, angles) in enumerate(zip(time_s.tolist(), sent, strict=True)):
-            follows = now - self._moved_s <= self.SETTLING_S
-            left = np.abs(angles - np.where(follows, self._moved_to, self._shaft))
-            moves = left > 0.5 * self._step
-            started = moves & ~follows
-            if started.any():
-                drawn = self._step * self._rng.uniform(-0.5, 0.5, 2)
-                self._goal = np.where(started, drawn, self._goal)
-            self._moved_s = np.where(moves, now, self._moved_s)
-            self._moved_to = np.where(moves, angles, self._moved_to)
-            stay = np.exp(-max(now - self._time_s, 0.0) / self.SETTLING_S)
-            self._rest = self._goal + stay * (self._rest - self._goal)
-            self._shaft = np.where(follows | moves, angles + self._rest, self._shaft)
-            self._time_s, out[i] = now, self._shaft
+        for i, angles in enumerate(sent):
+            if self._time_s is not None:
+                moving = angles != self._sent
+                started = moving & ~self._moving
+                if started.any():
+                    self._goal = np.where(started, self._draw(), self._goal)
+                stay = np.exp(-max(time_s[i] - self._time_s, 0.0) / self.SETTLING_S)
+                self._rest = self._goal + stay * (self._rest - self._goal)
+                self._moving = moving
+            self._time_s, self._sent = float(time_s[i]), angles
+            out[i] = angles + self._rest
         return out
 
     def read(self, shaft: Array) -> Array:
@@ -121,6 +116,9 @@ class Drive:
     def tell(self, speed: Array) -> Array:
         """Return the speeds that the drives tell for those (n, 2) that they see [rad/s]."""
         return self.SPEED_UNIT * np.round(speed / self.SPEED_UNIT)
+
+    def _draw(self) -> Array:
+        return self._step * self._rng.uniform(-0.5, 0.5, 2)
 
 
 @dataclass(frozen=True)
