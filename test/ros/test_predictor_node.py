@@ -1,3 +1,4 @@
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -172,6 +173,8 @@ def test_tare_makes_the_present_load_zero(graph, predictor, model):
     assert "no load estimate has arrived" in tare(60.0)
     graph.load(SECOND)
     wait_for_load(graph, predictor, SECOND)
+    silent_from_s = time.monotonic() + 0.001
+    graph.until(lambda: time.monotonic() > silent_from_s, "a millisecond without a load")
     assert tare(0.001).startswith("refused: no load estimate has arrived for ")
     assert predictor.stream.loads.zero is None
     assert tare(60.0) == ""
