@@ -39,7 +39,8 @@ def calibration_lines(found: Calibrated) -> list[str]:
     result, parameters = found.calibration, found.calibration.parameters
     rows = {"model as it stands": result.before, "calibrated": result.after}
     lines = _judged_lines(found.sessions, result.fit, result.judged_by, rows)
-    lines += [uncertainty_line(result.fit.joint)]
+    # Of a wrist that was not fitted nothing is known.
+    lines += [] if result.refused else [uncertainty_line(result.fit.joint)]
     lines += [f"WARNING: {warning}" for warning in result.warnings]
     lines += [found.mistake] if found.mistake else []
     parts = {
