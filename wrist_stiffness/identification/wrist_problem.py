@@ -40,8 +40,7 @@ from wrist_stiffness.sessions.unit_session import UnitSession
 
 LEAVES_MUCH, HELPS = 1.5, 0.8
 """Variance of what an effect leaves, in units of the noise, and share of the cost without it, at
-which its fit is tried again: from the drawing, for tolerances that gave way to a large effect may
-not find back, and with walls little by little."""
+which a fit with walls is tried again little by little."""
 
 FACTORS = (-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0)
 """Multiples of the typed values that are tried."""
@@ -186,14 +185,17 @@ class WristProblem:
             start = self._nearly(fit, candidate, ranked).base
             extras = list(start.beyond().values())
             found = self._fitted(extras, start)
-            if found.base.variance > LEAVES_MUCH and found.base.cost < HELPS * fit.base.cost:
-                tried = [found, self._fitted(extras, None)]
-                if any(each.law.state_is_a_guess for each in extras):
-                    tried.append(self._fitted(extras, fit.base, gradually=True))
-                found = min(tried, key=lambda each: each.base.cost)
+            walls = any(each.law.state_is_a_guess for each in extras)
+            if (
+                walls
+                and found.base.variance > LEAVES_MUCH
+                and found.base.cost < HELPS * fit.base.cost
+            ):
+                again = self._fitted(extras, fit.base, gradually=True)
+                found = min(found, again, key=lambda each: each.base.cost)
+            return found
         except WristError:
             return None
-        return found
 
     def without(self, fit: WristFit, name: str) -> WristFit:
         """Return the fit with one effect less, begun where this one ended."""
