@@ -12,6 +12,7 @@ from wrist_stiffness.commands.node_list import (
     truth,
     unknown_arguments,
 )
+from wrist_stiffness.commands.parameter_file import not_meant
 
 
 def start(context: LaunchContext) -> list[LogInfo | Node]:
@@ -26,6 +27,11 @@ def start(context: LaunchContext) -> list[LogInfo | Node]:
         parameters.append(given["params_file"])
     if given["model_file"]:
         parameters.append({"model_file": given["model_file"]})
+    entries = [*WRIST_NODES, *([SIMULATOR_NODE] if cell else [])]
+    warnings = unknown_arguments(given)
+    if given["params_file"]:
+        names = [f"/{namespace}/{entry.name}".replace("//", "/") for entry in entries]
+        warnings += not_meant(given["params_file"], names)
     nodes = [
         Node(
             package="wrist_stiffness",
@@ -36,10 +42,9 @@ def start(context: LaunchContext) -> list[LogInfo | Node]:
             respawn=truth("respawn", given["respawn"]),
             respawn_delay=1.0,
         )
-        for entry in (*WRIST_NODES, *([SIMULATOR_NODE] if cell else []))
+        for entry in entries
     ]
-    warnings = [LogInfo(msg=line) for line in unknown_arguments(given)]
-    return [*warnings, *nodes]
+    return [*(LogInfo(msg=line) for line in warnings), *nodes]
 
 
 def generate_launch_description() -> LaunchDescription:

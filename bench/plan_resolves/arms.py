@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from twins import Case, Catalogue
+from twins import PARAMETER, Case, Catalogue
 from wrist import LOADS, MODEL, NOISE, PACE, TABLE, WORKSPACE, left_by, once_each, performance
 
 from wrist_stiffness.model.effect import Effect
@@ -14,7 +14,6 @@ from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.planning import plan as planning
 from wrist_stiffness.planning import pool
 from wrist_stiffness.planning.information import (
-    CHARGE,
     RESOLVED,
     Goal,
     Information,
@@ -171,5 +170,5 @@ class Arms:
         """Return by how much each member lies behind the truth in the criterion, (..., m)."""
         goals = [Goal(name, name) for name in self.case.members]
         count = np.array([len(layout.columns[name]) for name in self.case.members])
-        lost = discrimination(gram, layout, goals) ** 2 + CHARGE * count
+        lost = discrimination(gram, layout, goals) ** 2 + PARAMETER * count
         return lost - lost[..., [self.true]]

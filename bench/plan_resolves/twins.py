@@ -12,7 +12,6 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import catalogue, effect_named
 from wrist_stiffness.planning.information import (
-    CHARGE,
     FREE,
     Goal,
     Information,
@@ -47,6 +46,9 @@ HIDDEN = (
 VISIBLE = 6.0
 """Discrimination from nothing that the hidden effect has in the paper's design, beyond what its
 law's parameters cost: a diagnosis finds it."""
+
+PARAMETER = float(np.log(300.0))
+"""What a parameter costs by the Bayesian information criterion, with some hundred numbers."""
 
 DECISIVE = 6.0
 MOST_TWINS = 5
@@ -144,7 +146,7 @@ class Catalogue:
             effects = [replace(r, truths=left[..., None]) if r.name == truth else r for r in rivals]
             known = information(self.timeline, self.nuisances, SESSION, effects, TABLE, NOISE)
             size = float(discrimination(known.total, known.layout, [Goal(truth, "")])[0])
-            wanted = np.sqrt(VISIBLE**2 + CHARGE * len(known.layout.columns[truth]))
+            wanted = np.sqrt(VISIBLE**2 + PARAMETER * len(known.layout.columns[truth]))
             if 0.8 * wanted < size < 1.25 * wanted:
                 break
             larger = hidden.magnitude * wanted / max(size, 1e-3)
@@ -195,7 +197,7 @@ def worth_its_parameters(known: Information, truth: str, name: str) -> bool:
     """Tell whether the criterion prefers an effect to nothing for what the truth left."""
     inner, cross = _normal(known.total, known.layout, truth, name)
     explained = float((cross.T @ np.linalg.solve(inner, cross)).item())
-    return explained > CHARGE * len(inner)
+    return explained > PARAMETER * len(inner)
 
 
 def in_bounds(gram: np.ndarray, layout: Layout, truth: str, signature: Signature) -> bool:

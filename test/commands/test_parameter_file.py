@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrist_stiffness.commands.parameter_file import node_settings
+from wrist_stiffness.commands.parameter_file import node_settings, not_meant
 from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.errors import InputError
 
@@ -135,3 +135,13 @@ def test_two_wrists_in_one_file_must_say_the_same(tmp_path):
         space = other.rpartition("/")[0] or "/"
         with pytest.raises(InputError, match=f"({space} and /left|/left and {space}) give the n"):
             node_settings(write(tmp_path, text))
+
+
+def test_a_name_without_the_namespace_of_the_nodes_is_told(tmp_path):
+    path = write(tmp_path, FILE)
+    nodes = ["/a/pose_error_predictor", "/a/angle_corrector"]
+    (told,) = not_meant(path, nodes)
+    assert f"{path}: /angle_corrector is not for /a/angle_corrector" in told
+    assert not_meant(path, ["/pose_error_predictor", "/angle_corrector"]) == []
+    meant = write(tmp_path, FILE.replace("angle_corrector:", "/**/angle_corrector:"))
+    assert not_meant(meant, nodes) == []

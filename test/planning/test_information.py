@@ -11,7 +11,6 @@ from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.planning.aims import after_data, as_asked
 from wrist_stiffness.planning.information import (
-    CHARGE,
     FREE,
     MOTION_NOISE,
     Goal,
@@ -123,6 +122,15 @@ def dense(model, timeline, nuisances, truth, rival):
     return np.sum(left**2, axis=0)
 
 
+def seen_log_det(gram, layout, name):
+    """How much smaller than a plausible size the uncertainty of an effect's parameters is."""
+    p = len(layout.prior)
+    places = np.concatenate([np.arange(p), p + layout.columns[name]])
+    prior = np.concatenate([layout.prior, np.ones(len(layout.columns[name]))])
+    covariance = np.linalg.inv(gram[np.ix_(places, places)] + np.diag(prior))
+    return -np.linalg.slogdet(covariance[p:, p:])[1]
+
+
 @pytest.mark.parametrize(("truth", "rival"), [(0, None), (1, 2), (2, 1), (2, 0), (0, 1)])
 def test_discrimination_is_the_distance_of_dense_least_squares(
     model, timeline, evaluated, known, truth, rival
@@ -134,7 +142,8 @@ def test_discrimination_is_the_distance_of_dense_least_squares(
     goal = Goal(effects[truth].name, "" if rival is None else effects[rival].name)
     if rival is not None:
         own = dense(model, timeline, nuisances, effects[truth].truths, None)
-        charge = CHARGE * (effects[rival].columns.shape[2] - effects[truth].columns.shape[2])
+        both = (effects[each].name for each in (truth, rival))
+        charge = np.diff([seen_log_det(known.total, known.layout, name) for name in both])
         apart = np.clip(apart + charge, 0.0, own)
     found = discrimination(known.total, known.layout, [goal])[0]
     # Over several truths the bound on a wrong answer is averaged.
@@ -317,11 +326,13 @@ def test_an_earlier_experiment_with_its_own_setup_adds_what_a_joint_fit_would(
     )
     y = np.concatenate([first[:, -1], second[:, -1]])
     ridge = np.concatenate([np.full(12, 1 / FREE), np.ones(6), [1 / FREE]])
-    for columns, d in ((19, found[0]), (18, found[1])):
+    both = (goals[0].truth, goals[0].rival)
+    charge = np.diff([seen_log_det(start + days[1].total, layout, name) for name in both])
+    for columns, d, more in ((19, found[0], charge), (18, found[1], 0.0)):
         matrix = np.vstack([design[:, :columns], np.diag(ridge[:columns])])
         target = np.concatenate([y, np.zeros(columns)])
         left = target - matrix @ np.linalg.lstsq(matrix, target, rcond=None)[0]
-        assert d == pytest.approx(np.linalg.norm(left), rel=1e-5)
+        assert d**2 == pytest.approx(left @ left + more, rel=1e-5)
 
 
 def test_a_recorded_session_is_the_experiment_that_was_performed(model, timeline):

@@ -108,8 +108,9 @@ def extend(arguments: argparse.Namespace) -> int:
       wrist-stiffness extend wrist_7.yaml --formula 'sag_mdeg * tanh(fz / soft_N)' \
           --component link_2 --direction 'about +x' --start soft_N=0.5 --fit monday -o own.yaml
 
-    In a formula every name that is no signal and no covariate of the recordings is a parameter. A
-    parameter whose name ends in a unit (_um, _mdeg, _N ...) is in SI units inside the formula.
+    In a formula a name that ends in a unit (_um, _mdeg, _N ...) is a parameter, in SI units inside
+    the formula; so is a name for which --start gives a value. All others are signals, or covariates
+    of the recordings.
     """
     from wrist_stiffness.commands.extend import extend_model
     from wrist_stiffness.report.fit_lines import extension_lines

@@ -75,6 +75,23 @@ def node_settings(
     return prediction, correction
 
 
+def not_meant(path: str | Path, nodes: Iterable[str]) -> list[str]:
+    """Return a warning for each name in a parameter file that misses a node by its namespace.
+
+    `nodes`: full names of those that are started.  Raises `InputError` if the file is no parameter
+    file.
+    """
+    by_name = {node.rpartition("/")[2]: node for node in nodes}
+    warnings = []
+    for name, _ in _said(read_yaml(path, InputError)):
+        node = by_name.get(name.rpartition("/")[2])
+        if node and not _is_for(name, node):
+            warnings.append(
+                f"WARNING: {path}: {name} is not for {node}, which keeps its defaults; write {node}"
+            )
+    return warnings
+
+
 def _said(node: Node, name: str = "") -> Iterator[tuple[str, Node]]:
     """Give the parameters in a file, in its order, each with the name of the nodes they are for."""
     if not isinstance(node.value, dict):

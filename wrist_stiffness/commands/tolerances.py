@@ -2,8 +2,8 @@
 
 Every tolerance of every wrist is drawn within its limit, as the priors of a diagnosis have it.  How
 far the wrist's error is from what the nominal model says, at poses over the operative workspace, is
-regressed on all of them at once: what a tolerance costs is the part that goes with it.  What goes
-with none alone (flanges that open or close, products) is a line of its own.
+regressed on all of them at once: what a tolerance costs is the part in proportion to it.  What is
+in proportion to none (flanges that open or close, products of several) is a line of its own.
 """
 
 from __future__ import annotations
@@ -281,7 +281,7 @@ def _study(
         for i, tolerance in enumerate(tolerances, start=1)
     ]
     costs.sort(key=lambda cost: -cost.size["s_um"][0])
-    others = Cost("several acting together", np.nan, sizes(rest + slopes[0] ** 2))
+    others = Cost("in proportion to none", np.nan, sizes(rest + slopes[0] ** 2))
     whole = Cost("all together", np.nan, sizes(total.squares / n))
     return ToleranceStudy(name, n, len(total.squares) // 6, load, tuple(costs), others, whole)
 

@@ -7,9 +7,10 @@ fit of X and of all nuisances N leaves of y,
     d^2 = min over x, n of |y - X x - N n|^2 + |n / prior|^2 + |x / loose|^2,
 
 so a likelihood ratio between the two errs with a probability of about Phi(-d/2) (T-optimality,
-Atkinson and Fedorov 1975).  Of two effects that fit alike the Bayesian information criterion takes
-the one with fewer parameters: each one more of the rival counts like `CHARGE` of d^2, but never
-beyond what lets the truth be seen at all.
+Atkinson and Fedorov 1975).  Of two effects that fit alike the evidence prefers the simpler one: for
+parameters that the measurements tell better than a plausible size does, it charges the logarithm of
+how much better, log det(I + X'X) (MacKay 1992).  What the rival is charged more than the truth
+counts like d^2, but never beyond what lets the truth be seen at all.
 """
 
 from __future__ import annotations
@@ -32,9 +33,6 @@ RESOLVED = 5.0
 
 FREE = 10.0
 """Prior of what is free, in plausible sizes: registrations, zeros, and a rival's parameters."""
-
-CHARGE = float(np.log(300.0))
-"""Of one parameter, with some hundred measured numbers."""
 
 MOTION_NOISE = 3.0
 """Noise of one moment in motion against that of a dwell, which averages some ten samples."""
@@ -211,6 +209,8 @@ def by_truth(
 def _squares(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
     """Return the squares of the discriminations (..., t) of each goal."""
     left = beyond_nuisances(gram, layout)
+    names = {name for goal in goals if goal.rival for name in (goal.truth, goal.rival)}
+    charge = {name: _charge(left, layout.columns[name]) for name in names}
     found = []
     for goal in goals:
         truth = layout.truths[goal.truth]
@@ -220,10 +220,17 @@ def _squares(gram: Array, layout: Layout, goals: Sequence[Goal]) -> list[Array]:
             inner = left[..., rival[:, None], rival] + np.eye(len(rival)) / FREE**2
             cross = left[..., rival[:, None], truth]
             apart = own - np.sum(cross * np.linalg.solve(inner, cross), axis=-2)
-            charge = CHARGE * (len(rival) - len(layout.columns[goal.truth]))
-            own = np.minimum(apart + charge, own)
+            more = (charge[goal.rival] - charge[goal.truth])[..., None]
+            own = np.minimum(apart + more, own)
         found.append(np.maximum(own, 0.0))
     return found
+
+
+def _charge(left: Array, columns: NDArray[np.intp]) -> Array:
+    """Return what the evidence charges for the parameters of an effect, (...)."""
+    own = left[..., columns[:, None], columns]
+    charge: Array = np.linalg.slogdet(own + np.eye(len(columns)))[1]
+    return charge
 
 
 def chance_right(discriminations: Array | float) -> Array:

@@ -81,7 +81,7 @@ def plan(
     if shortest.duration_s > seconds:
         raise InputError(
             f"plan: {seconds / 60.0:g} minutes are less than the "
-            f"{shortest.duration_s / 60.0:.1f} that "
+            f"{np.ceil(shortest.duration_s / 6.0) / 10.0:.1f} that "
             "warm-up, reference poses and two long holds take"
         )
     agree = bool(earlier and question.alike)

@@ -26,6 +26,11 @@ from wrist_stiffness.report.pictures.experiment_plan import draw_plan
 MOST_LINES = 15
 """Of each list; the rest is counted."""
 
+TWICE = (
+    "Carry it out twice and give all recordings to 'diagnose': the last one only judges what the "
+    "others show."
+)
+
 
 def require_new_folder(folder: str | Path) -> None:
     """Refuse a folder that exists, or whose parent does not (InputError)."""
@@ -98,6 +103,7 @@ def plan_summary(plan: Plan, commissioning: bool = False) -> str:
         lines += [f"keeps apart {sum(a.settled for a in pairs)} of {len(pairs)} ordered pairs"]
     else:
         lines += _listed("will settle:", (_line(a) for a in plan.answers if a.settled))
+        lines += ["", TWICE] if plan.timeline else []
     longer = [a for a in (*seen, *pairs) if not a.settled and a.reachable]
     lines += _listed(
         "may stay open; diagnose the new recordings too and plan again, or give it more time:",
@@ -147,10 +153,8 @@ def _line(answer: Answer, others: int = 0) -> str:
     if not goal.rival:
         return f"{goal.truth} against nothing: {d:.1f} standard deviations"
     more = f" and {others} more" if others else ""
-    return (
-        f"{goal.truth} if true, against {goal.rival}{more}: {d:.1f} standard deviations, right in "
-        f"{percent(float(chance_right(d)))}"
-    )
+    apart = f"{d:.1f} standard deviations, right in {percent(float(chance_right(d)))}"
+    return f"{goal.truth} if true, against {goal.rival}{more}: {apart if d else 'not told apart'}"
 
 
 def _listed(title: str, lines: Iterable[str], most: int = MOST_LINES) -> list[str]:
