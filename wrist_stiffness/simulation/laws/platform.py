@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from wrist_stiffness.mechanism.components import Array
@@ -9,33 +11,30 @@ from wrist_stiffness.mechanism.vectors import cross
 from wrist_stiffness.simulation.block import Block
 from wrist_stiffness.simulation.laws.law import Law
 
+REACH = 1e-3
+"""Change of a cable's length in which its friction comes 63 % nearer to its limit [m]."""
 
+
+@dataclass
 class Strands:
-    """Inner friction of a cable, by Dahl's law dF/dL = sigma (1 - F/Fc sign(dL)).
+    """Inner friction of a cable, by Dahl's law dF/dL = sigma (1 - F/Fc sign(dL))."""
 
-    `most`: Fc [N].
-    """
-
-    REACH = 1e-3
-    """Change of length in which friction comes 63 % nearer to its limit [m]."""
-
-    def __init__(self, most: float) -> None:
-        self._most = max(most, 1e-300)
-        self._past: float | None = None
-        self._friction = 0.0
+    most: float  # Fc [N]
+    past: float | None = None  # length [m]
+    friction: float = 0.0  # [N]
 
     def __call__(self, length: Array) -> Array:
         """Return the friction at the next lengths (n,) [m], (n,) [N]."""
         out = np.empty_like(length)
-        past = float(length[0]) if self._past is None else self._past
-        friction = self._friction
+        past = float(length[0]) if self.past is None else self.past
+        friction = self.friction
         for i, now in enumerate(length.tolist()):
             step = now - past
-            limit = np.copysign(self._most, step)
+            limit = np.copysign(self.most, step)
             # Exact for a step in one direction: friction nears its limit over the reach.
-            out[i] = friction = limit + (friction - limit) * np.exp(-abs(step) / self.REACH)
+            out[i] = friction = limit + (friction - limit) * np.exp(-abs(step) / REACH)
             past = now
-        self._past, self._friction = past, friction
+        self.past, self.friction = past, friction
         return out
 
 
