@@ -17,9 +17,10 @@ from wrist_stiffness.mechanism.components import (
     ElasticComponents,
 )
 from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.vectors import screws_to_origin
 from wrist_stiffness.model.law import Contribution, Law, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter, symmetric
-from wrist_stiffness.model.places import MOTOR_JOINT, bushing_centre, screw_from, wrench_at
+from wrist_stiffness.model.places import MOTOR_JOINT, bushing_centre
 
 
 class LinkStiffness(Law):
@@ -34,13 +35,9 @@ class LinkStiffness(Law):
     inexactness = 0.03
     own = (Parameter("flexibility_percent", -90.0, 10000.0, 30.0, linear=False),)
 
-    def part_factor(self, values: SIValues) -> float:
-        """Return 1 + fraction."""
-        return 1.0 + values["flexibility_percent"]
-
     def changed(self, parts: ElasticComponents, place: str, values: SIValues) -> ElasticComponents:
         """Return the parts with one of them scaled."""
-        factor = self.part_factor(values)
+        factor = 1.0 + values["flexibility_percent"]
         flexibility = parts.flexibility.copy()
         flexibility[ELASTIC.index(place)] *= factor
         contact = dict(parts.contact)
@@ -119,9 +116,9 @@ class MountCompliance(Law):
 
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the deflection under the wrench through the place."""
-        point, compliance = _centre(at.table.geometry, place), _compliance(values)
-        local = wrench_at(point, at.at_home(place, at.through_place(place)))
-        return at.screw(place, screw_from(point, local @ compliance))
+        to_origin = screws_to_origin(_centre(at.table.geometry, place))
+        whole = to_origin @ _compliance(values) @ to_origin.T
+        return at.screw(place, at.at_home(place, at.through_place(place)) @ whole)
 
 
 def _compliance(values: Mapping[str, float] | Mapping[str, Array]) -> Array:
