@@ -41,14 +41,10 @@ class Recent:
     """What the first of the last models did at a block, and what it rests on.
 
     The next ones often begin with it again.
-
-    Attributes
-    ----------
-    added : list of dict of str to Contribution
-        What its effects added to each chunk, by their names, but for constant ones.
     """
 
     def __init__(self) -> None:
+        # what its effects added to each chunk, by their names, but for constant ones
         self.added: list[dict[str, Contribution]] = []
         self._model: ErrorModel | None = None
         self._chunks: list[Evaluated] = []

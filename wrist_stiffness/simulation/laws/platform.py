@@ -38,30 +38,29 @@ class Strands:
         return out
 
 
+@dataclass
 class Inertia(Law):
-    """Newton's and Euler's forces of platform and tool in the motion that the motors make.
+    """Newton's and Euler's forces of platform and tool in the motion that the motors make."""
 
-    `mass` [kg]; `place` (3,): centre of gravity in U [m]; `gyration`: radius of gyration about it
-    [m].
-    """
-
-    def __init__(self, mass: float, place: Array, gyration: float) -> None:
-        self._mass = mass
-        # Three equal masses on a circle of the radius of gyration about the centre of gravity.
-        angles = 2.0 * np.pi * np.arange(3) / 3.0
-        circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=-1)
-        self._spots = place + np.sqrt(2.0) * gyration * circle
-        self._past = np.zeros(0), np.zeros((0, 3, 3))
+    mass: float  # [kg]
+    place: Array  # (3,), centre of gravity in U [m]
+    gyration: float  # radius of gyration about it [m]
+    # times [s] and three spots of the body (k, 3, 3) [m] at the last two samples
+    past: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3, 3)))
 
     def wrench(self, block: Block) -> Array:
         """Differentiate three spots of the body twice, by the last 3 samples."""
-        at = np.einsum("nij,sj->nsi", block.configuration.platform, self._spots)
-        time_s = np.append(self._past[0], block.time_s)[:, None, None]
-        path = np.concatenate([self._past[1], at])
-        self._past = time_s[-2:, 0, 0], path[-2:]
+        # Equal masses on a circle of the radius of gyration about the centre of gravity.
+        angles = 2.0 * np.pi * np.arange(3) / 3.0
+        circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=-1)
+        spots = self.place + np.sqrt(2.0) * self.gyration * circle
+        at = np.einsum("nij,sj->nsi", block.configuration.platform, spots)
+        time_s = np.append(self.past[0], block.time_s)[:, None, None]
+        path = np.concatenate([self.past[1], at])
+        self.past = time_s[-2:, 0, 0], path[-2:]
         speed = np.diff(path, axis=0) / np.diff(time_s, axis=0)
         force = np.zeros_like(at)
         # None at the first two samples of all.
         rate = 2.0 * np.diff(speed, axis=0) / (time_s[2:] - time_s[:-2])
-        force[len(force) - len(rate) :] = -self._mass / 3.0 * rate
+        force[len(force) - len(rate) :] = -self.mass / 3.0 * rate
         return np.concatenate([force.sum(axis=1), cross(at, force).sum(axis=1)], axis=-1)
