@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +117,7 @@ class MountCompliance(Law):
 
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the deflection under the wrench through the place."""
-        to_origin = screws_to_origin(_centre(at.table.geometry, place))
+        to_origin = _to_origin(at.table.geometry, place)
         whole = to_origin @ _compliance(values) @ to_origin.T
         return at.screw(place, at.at_home(place, at.through_place(place)) @ whole)
 
@@ -130,13 +131,14 @@ def _compliance(values: Mapping[str, float] | Mapping[str, Array]) -> Array:
     return found
 
 
-def _centre(geometry: Geometry, place: str) -> Array:
-    """Return the point of a place's spring at home, (3,) [m]."""
+@lru_cache(maxsize=32)
+def _to_origin(geometry: Geometry, place: str) -> Array:
+    """Return what takes screws at the point of a place's spring at home to O, (6, 6)."""
     if place == "frame":
-        return np.zeros(3)
+        return np.eye(6)
     if place == "platform":
-        return geometry.platform.centre
-    return bushing_centre(geometry, MOTOR_JOINT[place])
+        return screws_to_origin(geometry.platform.centre)
+    return screws_to_origin(bushing_centre(geometry, MOTOR_JOINT[place]))
 
 
 class FrameCompliance(MountCompliance):
