@@ -46,7 +46,6 @@ def settings_of(case: Case, session: int) -> CellSettings:
         base=case.base,
         base_seed=case.seed,
         session=session,
-        truth=case.path,
     )
 
 
@@ -68,7 +67,7 @@ def _scale(settings: CellSettings, seconds: float) -> Scale:
 def scale_of(case: Case) -> Scale:
     """Return the measure of sizes in the first session of a case."""
     # Sizes do not depend on what the sensor sees: cases share the work.
-    whole = replace(settings_of(case, 0), sees="pose", lost_beams=0.0, truth="fast")
+    whole = replace(settings_of(case, 0), sees="pose", lost_beams=0.0)
     return _scale(whole, case.seconds)
 
 

@@ -178,30 +178,6 @@ def test_bad_settings_and_angles_are_refused(wrist):
         cell.step(0.0, np.radians([90.0, 90.0]))
 
 
-def test_exact_truth_at_rests_is_the_fast_one_to_second_order(ran):
-    """Other code, the same wrist: what finite rotations leave, a thousandth of the motion."""
-    hidden = (HiddenEffect("mount_compliance", "motor_2", "plain", 2e-6, 4),)
-    (cell, time_s, sent, fast), (_, _, _, exact) = (
-        ran(12.0, instrument="cmm", hidden=hidden, truth=truth) for truth in ("fast", "exact")
-    )
-    seen = np.isfinite(fast.measured_shift).all(axis=1)
-    assert np.array_equal(seen, np.isfinite(exact.measured_shift).all(axis=1))
-    assert 2 <= np.count_nonzero(seen) < 10
-    rigid = cell.table.mechanism.forward(fast.encoder[seen]).platform
-    moved = log_motion(fast.pose_rotation[seen] @ np.swapaxes(rigid, -1, -2), fast.pose_shift[seen])
-    between = log_motion(
-        exact.pose_rotation[seen] @ np.swapaxes(fast.pose_rotation[seen], -1, -2),
-        exact.pose_shift[seen] - fast.pose_shift[seen],
-    )
-    for part in (slice(0, 3), slice(3, 6)):
-        largest = np.max(np.linalg.norm(moved[:, part], axis=1))
-        assert 0.0 < np.max(np.linalg.norm(between[:, part], axis=1)) < 2e-3 * largest
-    with pytest.raises(InputError, match="tracker measures all the time"):
-        CellSettings(instrument="tracker", truth="exact")
-    with pytest.raises(InputError, match="'true' is not one of fast, exact"):
-        CellSettings(instrument="cmm", truth="true")
-
-
 def test_lost_beams_are_missing_or_wild_and_the_rest_untouched(ran):
     clean, lost = (ran(40.0, lost_beams=share)[3] for share in (0.0, 0.5))
     gone = np.isnan(lost.measured_shift).any(axis=1)

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from exact_with_laws import ExactWrist
 
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.simulation.catalogue import CATALOGUE, HiddenEffect, build, places
-from wrist_stiffness.simulation.exact import ExactWrist
 from wrist_stiffness.simulation.experiment import random_load, random_pose
 from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.wrist import TrueWrist

@@ -14,7 +14,7 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist, log_motion
 from wrist_stiffness.model.error_model import Load, Prediction
 from wrist_stiffness.model.evaluation import FIRST_ORDER_LIMIT
 from wrist_stiffness.model.model_file import load_model
-from wrist_stiffness.simulation.exact import ExactWrist
+from wrist_stiffness.simulation.exact import exact_equilibrium
 
 
 def predict(
@@ -44,7 +44,7 @@ def predict(
     exact = None
     if past_first_order and not error_model.effects:
         # With finite rotations; of effects only the first order is known.
-        state = ExactWrist(table, ()).solve(theta, wrench.in_base(configuration))
+        state = exact_equilibrium(table, theta, wrench.in_base(configuration))
         exact = _lengths(log_motion(state.rotation @ configuration.platform.T, state.shift))
     return {
         **_values(prediction),

@@ -36,7 +36,7 @@ from wrist_stiffness.mechanism.pins import pin_flexibilities
 from wrist_stiffness.mechanism.rigid_motion import log_motion
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.simulation.exact import ExactWrist
+from wrist_stiffness.simulation.exact import exact_equilibrium
 
 DRAWS, EXACT_DRAWS = 400, 100
 
@@ -95,11 +95,11 @@ def second_order(table: Table) -> dict[str, float]:
     loads keep, relative to their lengths.
     """
     poses, loads = _draws(table, EXACT_DRAWS)
-    configuration, wrist = table.mechanism.forward(poses), ExactWrist(table, ())
+    configuration = table.mechanism.forward(poses)
     found = respond(table.operators_at(configuration, "closed_form"), loads).twist
     exact = []
     for theta, load, platform in zip(poses, loads, configuration.platform, strict=True):
-        state = wrist.solve(theta, load)
+        state = exact_equilibrium(table, theta, load)
         exact.append(log_motion(state.rotation @ platform.T, state.shift))
     return _bound(relative_misses(found, np.array(exact)))
 

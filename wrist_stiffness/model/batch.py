@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,18 +40,16 @@ class Recent:
     """What the first of the last models did at a block, and what it rests on.
 
     The next ones often begin with it again.
-
-    Attributes
-    ----------
-    added : list of dict of str to Contribution
-        What its effects added to each chunk, by their names, but for constant ones.
     """
 
     def __init__(self) -> None:
+        # what its effects added to each chunk, by their names, but for constant ones
         self.added: list[dict[str, Contribution]] = []
         self._model: ErrorModel | None = None
         self._chunks: list[Evaluated] = []
         self._begun: list[dict[str, Any]] = []
+        # where pins rested last in each chunk, by the effects' names: there a search begins
+        self._rests: list[Guesses] = []
 
     def like(self, model: ErrorModel) -> ErrorModel:
         """Return the known model if it is the same as one; else this one, from now on known."""
@@ -61,17 +58,22 @@ class Recent:
             return known
         alike = known is not None and _alike(known, model)
         self._begun = [_begun(each, model) for each in self._chunks if alike]
+        self._rests = self._rests if alike else []
         self._model, self._chunks, self.added = model, [], []
         return model
 
     def chunk(self, number: int, evaluated: Callable[..., Evaluated]) -> Evaluated:
         """Return what the known model did at a chunk, evaluated now if need be.
 
-        `evaluated` takes the `statics` and the `guess` of an earlier model, where there was one.
+        `evaluated` takes the `statics` and the `guess` of an earlier model, where there was one,
+        and the rests `near`.
         """
         if number < len(self._chunks):
             return self._chunks[number]
-        found = evaluated(**self._begun[number] if number < len(self._begun) else {})
+        begun = self._begun[number] if number < len(self._begun) else {}
+        near = self._rests[number] if number < len(self._rests) else NO_GUESSES
+        found = evaluated(near=near, **begun)
+        self._rests[number : number + 1] = [{**near, **found.guesses}]
         if number < MOST_KEPT:
             self._chunks.append(found)
         if number == len(self.added):
@@ -109,7 +111,6 @@ def predicted(
     models: Sequence[ErrorModel],
     block: Block,
     accepted: NDArray[np.bool_],
-    near: Sequence[Guesses] = (),
     recent: Recent | None = None,
     slopes: bool = False,
 ) -> list[BlockPrediction]:
@@ -118,13 +119,12 @@ def predicted(
     What they have in common with the first one is computed once.
 
     `block`: n samples; `accepted` (n,): those inside the table's domain and load range; the
-    effects' memory passes over the rest; `near`: `guesses` of an earlier prediction of this block;
-    `recent`: of this block; then `models` begin with what it says is like the first; `slopes`: as
-    for `evaluate_beside`.  Raises `UndefinedFormulaError` if a user's formula has no finite value;
-    the message says how long after the first sample.
+    effects' memory passes over the rest; `recent`: of this block; then `models` begin with what it
+    says is like the first; `slopes`: as for `evaluate_beside`.  Raises `UndefinedFormulaError` if a
+    user's formula has no finite value; the message says how long after the first sample.
     """
     try:
-        return _predicted(models, block, accepted, near, recent or Recent(), slopes)
+        return _predicted(models, block, accepted, recent or Recent(), slopes)
     except UndefinedFormulaError as error:
         after = error.time_s - float(block.time[0])
         told = f"{error}, {after:.3f} s after the start"
@@ -135,7 +135,6 @@ def _predicted(
     models: Sequence[ErrorModel],
     block: Block,
     accepted: NDArray[np.bool_],
-    near: Sequence[Guesses],
     recent: Recent,
     slopes: bool,
 ) -> list[BlockPrediction]:
@@ -144,14 +143,10 @@ def _predicted(
     memories: list[Memory | None] = [None] * len(models)
     warnings: list[dict[str, None]] = [{} for _ in models]
     lacking: list[dict[str, str]] = [{} for _ in models]
-    guesses: list[Guesses] = []
-    for number, guess in zip(
-        range(-(-len(usable) // CHUNK)), chain(near, repeat(NO_GUESSES)), strict=False
-    ):
+    for number in range(-(-len(usable) // CHUNK)):
         chosen = slice(number * CHUNK, (number + 1) * CHUNK)
         part, own = usable.take(chosen), rows[chosen]
-        first = recent.chunk(number, partial(evaluate, models[0], part, memories[0], near=guess))
-        guesses.append(first.guesses)
+        first = recent.chunk(number, partial(evaluate, models[0], part, memories[0]))
         beside = max(1, STACK // len(part))
         groups = [slice(begin, begin + beside) for begin in range(1, len(models), beside)]
         for group in (slice(0, 1), *groups):
@@ -165,8 +160,6 @@ def _predicted(
                 warnings[n].update(dict.fromkeys(each.warnings))
                 lacking[n].update(each.lacking)
     return [
-        BlockPrediction(
-            twists[i], measured[i], accepted, tuple(warnings[i]), lacking[i], tuple(guesses)
-        )
+        BlockPrediction(twists[i], measured[i], accepted, tuple(warnings[i]), lacking[i])
         for i in range(len(models))
     ]

@@ -75,7 +75,9 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
         before, after = model.effects[:number], model.effects[number + 1 :]
         if effect.stage == "parts":
             k = ELASTIC.index(effect.component)
-            nominal = twists[k] / effect.law.part_factor(effect.si)
+            # The law scales all of its part alike.
+            softer = at.parts.flexibility[k, 0, 0] / model.table.components.flexibility[k, 0, 0]
+            nominal = twists[k] / softer
             twist, twists[k] = twists[k] - nominal, nominal
         else:
             if effect.law.constant:

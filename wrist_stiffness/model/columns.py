@@ -120,8 +120,7 @@ def at_usual_size(parameter: Parameter, size: float) -> Recipe:
     size : float
         In its unit.
     """
-    column = Column(parameter, {parameter.key: size}, size)
-    return Recipe((), lambda at: (column,), lambda found, at: {parameter.key: found[parameter.key]})
+    return share_of_shape((parameter,), parameter.key, {parameter.key: size})
 
 
 def share_of_shape(
@@ -132,17 +131,18 @@ def share_of_shape(
     Parameters
     ----------
     parameters : sequence of Parameter
-        Of the law at a place; those with a grid are the shape.
+        Of the law at a place; those with a grid are the shape, unless they are fixed.
     key : str
         The one of them in units of which the share counts, so that it reads as that parameter.
     fixed : dict of str to float
         Values of the others in every trial.
     """
-    gridded = [each for each in parameters if each.grid]
+    fixed = fixed or {}
+    gridded = [each for each in parameters if each.grid and each.key not in fixed]
     own = next(each for each in parameters if each.key == key)
 
     def values(at: Shape) -> Values:
-        return {**(fixed or {}), **dict(zip((each.key for each in gridded), at, strict=True))}
+        return {**fixed, **dict(zip((each.key for each in gridded), at, strict=True))}
 
     def columns(at: Shape) -> tuple[Column, ...]:
         return (Column(own, values(at), values(at)[key]),)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -313,7 +312,6 @@ class ErrorModel:
         self,
         block: Block,
         additions: Sequence[Sequence[Effect]],
-        near: Sequence[Mapping[str, Any]] = (),
         recent: Recent | None = None,
         slopes: bool = False,
     ) -> list[BlockPrediction]:
@@ -328,10 +326,8 @@ class ErrorModel:
             n samples.
         additions : sequence of sequences of Effect
             Further effects of each model; an empty one for the model as it is.
-        near : sequence of dict, optional
-            `guesses` of an earlier prediction of this block: it changes the cost alone.
         recent : Recent, optional
-            What was done at this block the last time: likewise.
+            What was done at this block the last time: it changes the cost alone.
         slopes : bool
             Whether the models differ from the first one by little, for slopes: then constants are
             carried to first order, which is far quicker.
@@ -345,7 +341,7 @@ class ErrorModel:
         if recent is not None:
             first = recent.like(first)
         models = [first, *(first.with_effects(*self.effects, *e) for e in additions[1:])]
-        return predicted(models, block, self.accepts(block), near, recent, slopes)
+        return predicted(models, block, self.accepts(block), recent, slopes)
 
     def accepts(self, block: Block) -> NDArray[np.bool_]:
         """Tell which samples of a block are finite, in the domain and in the load range, (n,)."""

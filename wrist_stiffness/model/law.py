@@ -203,10 +203,6 @@ class Law:
         """Return the elastic parts with the effect; only laws of the stage `parts` change them."""
         return parts
 
-    def part_factor(self, values: SIValues) -> float:
-        """Return by how much a law of the stage `parts` scales the flexibility of its part."""
-        return 1.0
-
     def load_share(self, values: SIValues) -> float | None:
         """Return the share of the said load that the law adds; None where it adds anything else."""
         return None

@@ -44,16 +44,6 @@ NEIGHBOUR = {
 """The joint at the other end of the link that a joint's cross axes are laid by."""
 
 
-def wrench_at(point: Array, wrench: Array) -> Array:
-    """Return at a point (3,) a wrench (n, 6) given at O: its moment less point x force."""
-    return np.concatenate([wrench[:, :3], wrench[:, 3:] - cross(point, wrench[:, :3])], axis=1)
-
-
-def screw_from(point: Array, screw: Array) -> Array:
-    """Return at O a screw (n, 6) given at a point (3,): its translation plus point x rotation."""
-    return np.concatenate([screw[:, :3] + cross(point, screw[:, 3:]), screw[:, 3:]], axis=1)
-
-
 def bushing_centre(geometry: Geometry, joint: str) -> Array:
     """Return the centre of a joint's bushing at home, (3,) [m]."""
     return geometry.bushings[joint].radius * geometry.axes[joint]
@@ -78,5 +68,6 @@ def end_screws(geometry: Geometry, joint: str) -> Array:
     axis, length = geometry.axes[joint], geometry.bushings[joint].length
     across = cross_axes(geometry, joint)[:2]
     turn = cross(axis, across) / length
-    local = np.concatenate([np.tile(0.5 * across, (2, 1)), np.concatenate([turn, -turn])], axis=1)
-    return screw_from(bushing_centre(geometry, joint), local)
+    turns = np.concatenate([turn, -turn])
+    shifts = np.tile(0.5 * across, (2, 1)) + cross(bushing_centre(geometry, joint), turns)
+    return np.concatenate([shifts, turns], axis=1)

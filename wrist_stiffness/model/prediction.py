@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,9 +73,6 @@ class BlockPrediction:
     warnings: tuple[str, ...]  # each once
     # signals without which effects were left out, by the effects' names
     lacking: Mapping[str, str] = field(default_factory=dict)
-    # where the first model's pins came to rest, chunk by chunk: where another prediction of the
-    # same block may begin to look
-    guesses: tuple[Mapping[str, Any], ...] = field(default=(), repr=False)
 
 
 def seen(twist: Array, left: Array | None, right: Array | None) -> Array:

@@ -40,17 +40,8 @@ def only_constants_differ(model: ErrorModel, like: Evaluated) -> bool:
 def with_constants(models: Sequence[ErrorModel], like: Evaluated) -> list[Evaluated]:
     """Return what models do that differ from an evaluated one by little, and in constants alone.
 
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-        t of them, of which `only_constants_differ` holds.
-    like : Evaluated
-        n samples with m flange sectors.
-
-    Returns
-    -------
-    list of Evaluated
-        First order in the changes, with the flanges that touch held closed.
+    `models`: t of them, of which `only_constants_differ` holds; `like`: n samples with m flange
+    sectors.  Gives first order in the changes, with the flanges that touch held closed.
     """
     if not models:
         return []

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -93,10 +92,8 @@ class SessionModel:
         """Return what the sensor would say of each unit, (u, 6); pins begin where they rested."""
         session = self.session if moments is Moments.PATH else self._without_path
         block = self.session.still if moments is Moments.MEAN else session.block
-        rests = self._rests.get(moments, ())
         recent = self.session.known.setdefault(moments, Recent())
-        found = self.model.with_effects().batch_with(block, trials, rests, recent, slopes)
-        self._rests[moments] = found[0].guesses
+        found = self.model.with_effects().batch_with(block, trials, recent, slopes)
         if moments is Moments.MEAN:
             return [each.measured for each in found]
         return [session.mean_twist(each.measured) for each in found]
@@ -104,10 +101,6 @@ class SessionModel:
     @cached_property
     def _without_path(self) -> UnitSession:
         return replace(self.session, cut=self.session.cut.without_path)
-
-    @cached_property
-    def _rests(self) -> dict[Moments, tuple[Mapping[str, Any], ...]]:
-        return {}
 
     def predicted(
         self,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.errors import InputError, UnreachablePoseError
+from wrist_stiffness.errors import UnreachablePoseError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.mechanism.kinematics import angles_text, first_where
@@ -15,7 +15,6 @@ from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.simulation.base import base_laws
 from wrist_stiffness.simulation.block import Rate, taken
 from wrist_stiffness.simulation.catalogue import HiddenEffect, build
-from wrist_stiffness.simulation.exact import ExactWrist
 from wrist_stiffness.simulation.experiment import experiment
 from wrist_stiffness.simulation.heat import HEATED
 from wrist_stiffness.simulation.instrument import LoadSensor, NoiseSource, PoseView, instrument
@@ -27,15 +26,11 @@ SENSED = (*HEATED, "ambient")
 """Bodies whose temperature the cell knows."""
 
 
-TRUTHS = ("fast", "exact")
-
-
 @dataclass(frozen=True)
 class CellSettings:
     """What the cell does and with which sensors; the seed of its noise is not part of it.
 
-    Raises `InputError` if the instrument or its view is not known, or the truth not to be had with
-    this instrument.
+    Raises `InputError` if the instrument or its view is not known.
     """
 
     rate_hz: float = 100.0  # samples per second, positive
@@ -52,20 +47,10 @@ class CellSettings:
     base: str = "exact"
     base_seed: int = 0
     session: int = 0  # number of the session: registrations of a wrong base differ between them
-    # `fast`, or `exact`: at the rests where a static instrument measures, the equilibrium of all
-    # bodies at once.  It leaves out laws that need motion
-    truth: str = "fast"
 
     def __post_init__(self) -> None:
-        """Check what goes with what."""
-        sensor = instrument(self.instrument)
-        if self.truth not in TRUTHS:
-            raise InputError(f"truth {self.truth!r} is not one of {', '.join(TRUTHS)}")
-        if self.truth == "exact" and not sensor.static:
-            raise InputError(
-                f"exact truth needs an instrument that measures at rests; {self.instrument} "
-                "measures all the time"
-            )
+        """Check the instrument and its view."""
+        instrument(self.instrument)
         PoseView(self.sees, self.lost_beams, np.random.default_rng(0))
 
 
@@ -166,8 +151,6 @@ class VirtualCell:
         for law in self._laws:
             law.told(self.program)
         self._wrist = TrueWrist(table, self._laws)
-        # Laws have histories: each wrist has laws of its own.
-        self._exact = ExactWrist(table, true_laws(table, settings))
         drive_rng, load_rng, pose_rng, view_rng = rng.spawn(4)
         sensor, pose_sensor = settings.load_sensor, instrument(settings.instrument)
         self._static = pose_sensor.static
@@ -203,13 +186,6 @@ class VirtualCell:
         phase = self.program.phase(time_s)
         load, room = self.program.load(phase), self.program.ambient(phase)[:, 0]
         true = self._wrist.run(time_s, shaft, load, room)
-        if self.settings.truth == "exact":
-            for i in np.flatnonzero(self._rest_ends(time_s)):
-                block = true.block
-                exact = self._exact.solve(
-                    block.configuration.theta[i], block.load[i], block.temperature[i]
-                )
-                true.rotation[i], true.shift[i] = exact.rotation, exact.shift
         encoder, wrench, rotation, shift = self._readings(time_s, shaft, load, true)
         noise = self._pose_noise(time_s)
         # A tracker's errors in position and orientation are separate, not one rigid motion.

@@ -108,7 +108,6 @@ class Scale:
             sees="pose",
             lost_beams=0.0,
             load_sensor=quiet,
-            truth="fast",
         )
         rate_hz = min(settings.rate_hz, FASTEST_HZ)
         self.time_s = np.arange(max(1, round(seconds * rate_hz))) / rate_hz

@@ -6,6 +6,7 @@ more than the largest magnitude would not work.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -80,114 +81,109 @@ class Resonance(Law):
         return self._steps[dt]
 
 
+@dataclass
 class LooseningScrew(Bending):
     """A link's clamp screw works loose: its end gets softer with all that the motors have moved.
 
     The gears shake it, and it never tightens again.
-
-    `flexibility` (6, 6): of the open clamp, at O with the wrist at home [m/N, rad/N, rad/(N m)];
-    `path`: sum of both motors' motion after which 63 % of it are there [rad].
     """
 
-    def __init__(self, link: str, flexibility: Array, path: float) -> None:
-        self.component, self._flexibility, self._path = link, flexibility, path
-        self._past: tuple[float, Array] | None = None
-        self._loose = np.zeros(0), np.zeros(0)
+    component: str  # link
+    flexibility: Array  # (6, 6), of the open clamp, at O, wrist at home [m/N, rad/N, rad/(N m)]
+    path: float  # sum of both motors' motion after which 63 % of it are there [rad]
+    past: tuple[float, Array] | None = None  # motion so far, and angles (2,) [rad]
+    # times (n,) [s], and how much of the clamp is open (n,) [-]
+    loose: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
 
     def screws(self, block: Block) -> Array:
         """Count what the motors move."""
         theta = block.configuration.theta
-        so_far, past = self._past or (0.0, theta[0])
+        so_far, past = self.past or (0.0, theta[0])
         moved = so_far + np.cumsum(np.abs(np.diff(theta, axis=0, prepend=past[None])).sum(axis=1))
-        self._past = float(moved[-1]), theta[-1]
-        self._loose = block.time_s, -np.expm1(-moved / self._path)
+        self.past = float(moved[-1]), theta[-1]
+        self.loose = block.time_s, -np.expm1(-moved / self.path)
         return no_screws(block)
 
     def bend(self, block: Block, wrench: Array) -> tuple[Array, Array]:
         """Give way to the wrench, as loose as the screw is by now."""
         turn = block_diagonal(block.rotation(self.component))
-        loose = np.interp(block.time_s, *self._loose)[:, None, None]
-        soft = loose * (turn @ self._flexibility @ np.swapaxes(turn, -1, -2))
+        loose = np.interp(block.time_s, *self.loose)[:, None, None]
+        soft = loose * (turn @ self.flexibility @ np.swapaxes(turn, -1, -2))
         return (soft @ wrench[..., None])[..., 0], soft
 
 
+@dataclass
 class SqueezeFilm(Flowing):
     """A passive joint's pin sinks along its radial force while at rest; turning centres it again.
 
     The force squeezes the lubricant out of the gap, the faster the larger it is.
-
-    `joint`: passive joint; `gap`: radial gap, the farthest that the pin sinks [m]; `time_s`: time
-    constant of sinking under 1 N [s]; `turn`: turn of the joint that draws 63 % of the lubricant in
-    again [rad].
     """
 
-    def __init__(self, joint: str, seat: Seat, gap: float, time_s: float, turn: float) -> None:
-        self.component, self._seat, self._gap = joint, seat, gap
-        self._time_s, self._turn = time_s, turn
-        self._past: tuple[float, float, Array] | None = None
+    component: str  # passive joint
+    seat: Seat  # of its bushing
+    gap: float  # radial, the farthest that the pin sinks [m]
+    time_s: float  # time constant of sinking under 1 N [s]
+    refill: float  # turn of the joint which draws 63 % of the lubricant in again [rad]
+    past: tuple[float, float, Array] | None = None  # time [s], turn [rad] and place (3,) [m]
 
     def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
         """Sink by time and force, rise by turn."""
-        to_origin = self._seat.to_origin(block.rotation(self.component))
-        across = np.eye(3) - np.outer(self._seat.axis, self._seat.axis)
+        to_origin = self.seat.to_origin(block.rotation(self.component))
+        across = np.eye(3) - np.outer(self.seat.axis, self.seat.axis)
         force = np.einsum("nji,nj->ni", to_origin, wrench)[:, :3] @ across
         size = np.sqrt(np.sum(force * force, axis=-1))
-        wall = self._gap * force / np.maximum(size, 1e-12)[:, None]
-        turn = joint_turn(block, self.component, self._seat.axis)
+        wall = self.gap * force / np.maximum(size, 1e-12)[:, None]
+        turn = joint_turn(block, self.component, self.seat.axis)
         # It was turned before the start.
-        before, angle, sunk = self._past or (block.time_s[0], turn[0], np.zeros(3))
+        before, angle, sunk = self.past or (block.time_s[0], turn[0], np.zeros(3))
         out = np.zeros_like(wrench)
         for i, now in enumerate(block.time_s):
-            sunk = sunk * np.exp(-abs(turn[i] - angle) / self._turn)
-            sunk = wall[i] + (sunk - wall[i]) * np.exp(-size[i] * (now - before) / self._time_s)
+            sunk = sunk * np.exp(-abs(turn[i] - angle) / self.refill)
+            sunk = wall[i] + (sunk - wall[i]) * np.exp(-size[i] * (now - before) / self.time_s)
             before, angle = now, turn[i]
             out[i, :3] = sunk
         if remember:
-            self._past = float(before), float(angle), sunk
+            self.past = float(before), float(angle), sunk
         return np.einsum("nij,nj->ni", to_origin, out)
 
 
+@dataclass
 class Switch:
     """Two states; it changes where a signal leaves a band, and remembers."""
 
-    def __init__(self, band: float) -> None:
-        self._band, self._on = band, False
+    band: float
+    on: bool = False
 
     def __call__(self, signal: Array) -> Array:
         """Return the state (n,) as 0 or 1 for a signal (n,)."""
         out = np.empty(len(signal))
         for i, value in enumerate(signal):
-            if abs(value) > self._band:
-                self._on = bool(value > 0.0)
-            out[i] = self._on
+            if abs(value) > self.band:
+                self.on = bool(value > 0.0)
+            out[i] = self.on
         return out
 
 
+@dataclass
 class PlasticSet(Flowing):
-    """A part yields a little whenever a load is larger than all before, and stays bent.
+    """A part yields a little whenever a load is larger than all before, and stays bent."""
 
-    `direction` (6,): of screw and wrench at O with the wrist at home; unit in force.  `per_newton`:
-    set per force beyond the yield point [m/N].  `yielding`: yield point [N].
-    """
-
-    def __init__(
-        self, component: str, direction: Array, per_newton: float, yielding: float
-    ) -> None:
-        self.component = component
-        self._direction, self._per_newton = direction, per_newton
-        self._worst = np.full(2, yielding)
-        self._yielding = yielding
+    component: str
+    direction: Array  # (6,), of screw and wrench at O with the wrist at home; unit in force
+    per_newton: float  # set per force beyond the yield point [m/N]
+    yielding: float  # yield point [N]
+    worst: Array | float = 0.0  # (2,), largest load to each side so far [N]
 
     def flow(self, block: Block, wrench: Array, remember: bool) -> Array:
         """Set grows with the largest load so far, to each side on its own."""
         turn = block_diagonal(block.rotation(self.component))
-        load = np.einsum("nji,nj->ni", turn, wrench) @ self._direction
+        load = np.einsum("nji,nj->ni", turn, wrench) @ self.direction
         both = np.stack([load, -load], axis=-1)
-        worst = np.maximum(np.maximum.accumulate(both, axis=0), self._worst)
-        bent = self._per_newton * ((worst - self._yielding) @ np.array([1.0, -1.0]))
+        worst = np.maximum.accumulate(np.maximum(both, np.maximum(self.worst, self.yielding)))
+        bent = self.per_newton * ((worst - self.yielding) @ np.array([1.0, -1.0]))
         if remember:
-            self._worst = worst[-1]
-        return bent[:, None] * (turn @ self._direction)
+            self.worst = worst[-1]
+        return bent[:, None] * (turn @ self.direction)
 
 
 def bump(angle: Array, at: float, width: float) -> Array:

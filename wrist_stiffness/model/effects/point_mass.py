@@ -27,39 +27,40 @@ AT_PLATE = {"x_mm": 0.0, "y_mm": 0.0, "z_mm": -12.0, "inertia_gmm2": 0.0}
 """About where the shipped wrist has its plate: from there a moving mass is sought."""
 
 
-def mass_columns(
-    parameters: Sequence[Parameter], mass_g: float, at: Values, arm_mm: float
-) -> tuple[Column, ...]:
-    """Return columns of a mass and of its first moment, mass times place, along x, y and z.
+def by_first_moment(
+    parameters: Sequence[Parameter],
+    mass_g: float,
+    at: Values,
+    arm_mm: float,
+    sizes: Mapping[str, float],
+    lightest_g: float = -np.inf,
+) -> Recipe:
+    """Return columns of a mass, of its first moment along x, y and z, and of further parameters.
 
-    `parameters`: among them `mass_g`, `x_mm`, `y_mm` and `z_mm`.  `at`: values of all other
-    parameters in the trials; the first moment counts from its place.  `arm_mm`: by how much the
-    trials move the mass.
+    The first moment, mass times place, is linear where the place is not.
+
+    `parameters`: among them `mass_g`, `x_mm`, `y_mm` and `z_mm`.  `mass_g`, `arm_mm`: mass of the
+    trials, and by how much they move it.  `at`: values of all other parameters in the trials; the
+    first moment counts from its place.  `sizes`: of the trials of further parameters.
+    `lightest_g`: mass with which a fit begins at least.
     """
-    own = {each.key: each for each in parameters}
+    own, still = {each.key: each for each in parameters}, at | {"mass_g": 0.0}
     heavy = at | {"mass_g": mass_g}
-    return (
-        Column(own["mass_g"], heavy, mass_g),
-        *(
-            Column(
-                Parameter(_moment(axis), -np.inf, np.inf, own["mass_g"].scale * own[key].scale),
-                heavy | {key: at[key] + arm_mm},
-                mass_g * arm_mm,
-                heavy,
-            )
-            for axis, key in PLACE.items()
-        ),
-    )
+    columns = [Column(own["mass_g"], heavy, mass_g)]
+    for axis, key in PLACE.items():
+        moment = Parameter(_moment(axis), -np.inf, np.inf, own["mass_g"].scale * own[key].scale)
+        moved = heavy | {key: at[key] + arm_mm}
+        columns.append(Column(moment, moved, mass_g * arm_mm, heavy))
+    columns += [Column(own[key], still | {key: size}, size) for key, size in sizes.items()]
 
+    def start(found: Mapping[str, float], shape: Shape) -> Values:
+        mass = max(found["mass_g"], lightest_g)
+        begin = {"mass_g": mass} | {key: found[key] for key in sizes}
+        for axis, key in PLACE.items():
+            begin[key] = own[key].within(at[key] + found[_moment(axis)] / (mass or 1.0))
+        return begin
 
-def place_of(
-    parameters: Sequence[Parameter], found: Mapping[str, float], mass_g: float, at: Values
-) -> Values:
-    """Return where a mass is, within the bounds, by the factors of `mass_columns`."""
-    own = {each.key: each for each in parameters}
-    return {
-        key: own[key].within(at[key] + found[_moment(axis)] / mass_g) for axis, key in PLACE.items()
-    }
+    return Recipe((), lambda shape: tuple(columns), start)
 
 
 def _moment(axis: str) -> str:
@@ -99,18 +100,8 @@ class Gravity(Law):
         """Return columns of the mass and its first moment, and of the tilt of the base."""
         parameters = self.parameters(place)
         nothing = {each.key: 0.0 for each in parameters}
-        columns = mass_columns(parameters, TRIAL_G, nothing, TRIAL_MM)
-        tilts = [each for each in parameters if each.key in TILTS]
-        columns += tuple(
-            Column(each, nothing | {each.key: TRIAL_MDEG}, TRIAL_MDEG) for each in tilts
-        )
-
-        def start(found: Mapping[str, float], at: Shape) -> Values:
-            mass = found["mass_g"]
-            centre = place_of(parameters, found, mass or 1.0, nothing)
-            return centre | {"mass_g": mass} | {each.key: found[each.key] for each in tilts}
-
-        return Recipe((), lambda at: columns, start)
+        tilts = {key: TRIAL_MDEG for key in TILTS if key in nothing}
+        return by_first_moment(parameters, TRIAL_G, nothing, TRIAL_MM, tilts)
 
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the weight as a wrench, and the change of all weights by the tilt."""
@@ -161,18 +152,8 @@ class Inertia(Law):
     def linearised(self, place: str, signals: frozenset[str]) -> Recipe:
         """Return columns of a mass moving at the plate, of its place, and of a round inertia."""
         mass, *_, inertia = self.own
-        trial = AT_PLATE | {"mass_g": 0.0, "inertia_gmm2": inertia.scale}
-        columns = (
-            *mass_columns(self.own, mass.scale, AT_PLATE, 1.0),
-            Column(inertia, trial, inertia.scale),
-        )
-
-        def start(found: Mapping[str, float], at: Shape) -> Values:
-            mass = max(found["mass_g"], 1.0)
-            centre = place_of(self.own, found, mass, AT_PLATE)
-            return centre | {"mass_g": mass, "inertia_gmm2": max(found["inertia_gmm2"], 0.0)}
-
-        return Recipe((), lambda at: columns, start)
+        sizes = {inertia.key: inertia.scale}
+        return by_first_moment(self.own, mass.scale, AT_PLATE, 1.0, sizes, lightest_g=1.0)
 
     def advance(self, at: Situation, place: str, values: SIValues, state: Any) -> Outcome:
         """Return the wrench; the state is the last sample's time and velocity."""

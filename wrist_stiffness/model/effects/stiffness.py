@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,10 @@ from wrist_stiffness.mechanism.components import (
     ElasticComponents,
 )
 from wrist_stiffness.mechanism.geometry import Geometry
+from wrist_stiffness.mechanism.vectors import screws_to_origin
 from wrist_stiffness.model.law import Contribution, Law, Situation, SIValues
 from wrist_stiffness.model.parameters import Parameter, symmetric
-from wrist_stiffness.model.places import MOTOR_JOINT, bushing_centre, screw_from, wrench_at
+from wrist_stiffness.model.places import MOTOR_JOINT, bushing_centre
 
 
 class LinkStiffness(Law):
@@ -34,13 +36,9 @@ class LinkStiffness(Law):
     inexactness = 0.03
     own = (Parameter("flexibility_percent", -90.0, 10000.0, 30.0, linear=False),)
 
-    def part_factor(self, values: SIValues) -> float:
-        """Return 1 + fraction."""
-        return 1.0 + values["flexibility_percent"]
-
     def changed(self, parts: ElasticComponents, place: str, values: SIValues) -> ElasticComponents:
         """Return the parts with one of them scaled."""
-        factor = self.part_factor(values)
+        factor = 1.0 + values["flexibility_percent"]
         flexibility = parts.flexibility.copy()
         flexibility[ELASTIC.index(place)] *= factor
         contact = dict(parts.contact)
@@ -119,9 +117,9 @@ class MountCompliance(Law):
 
     def added(self, at: Situation, place: str, values: SIValues) -> Contribution:
         """Return the deflection under the wrench through the place."""
-        point, compliance = _centre(at.table.geometry, place), _compliance(values)
-        local = wrench_at(point, at.at_home(place, at.through_place(place)))
-        return at.screw(place, screw_from(point, local @ compliance))
+        to_origin = _to_origin(at.table.geometry, place)
+        whole = to_origin @ _compliance(values) @ to_origin.T
+        return at.screw(place, at.at_home(place, at.through_place(place)) @ whole)
 
 
 def _compliance(values: Mapping[str, float] | Mapping[str, Array]) -> Array:
@@ -133,13 +131,14 @@ def _compliance(values: Mapping[str, float] | Mapping[str, Array]) -> Array:
     return found
 
 
-def _centre(geometry: Geometry, place: str) -> Array:
-    """Return the point of a place's spring at home, (3,) [m]."""
+@lru_cache(maxsize=32)
+def _to_origin(geometry: Geometry, place: str) -> Array:
+    """Return what takes screws at the point of a place's spring at home to O, (6, 6)."""
     if place == "frame":
-        return np.zeros(3)
+        return np.eye(6)
     if place == "platform":
-        return geometry.platform.centre
-    return bushing_centre(geometry, MOTOR_JOINT[place])
+        return screws_to_origin(geometry.platform.centre)
+    return screws_to_origin(bushing_centre(geometry, MOTOR_JOINT[place]))
 
 
 class FrameCompliance(MountCompliance):

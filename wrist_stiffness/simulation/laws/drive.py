@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,25 +39,26 @@ def ahead_of_encoder(motor: str, ahead: Callable[[Array], Array]) -> Law:
     return Law(motor, turn=turn)
 
 
+@dataclass
 class Backlash(Law):
     """Lost motion: the link is dragged by the flanks of its gear or coupling.
 
-    `widths` (k,): full widths of k play operators in parallel [rad]; one is a single pair of teeth,
-    several (Prandtl-Ishlinskii) a train whose teeth take hold one after the other.
+    One play operator is a single pair of teeth, several in parallel (Prandtl-Ishlinskii) a train
+    whose teeth take hold one after the other.
     """
 
-    def __init__(self, motor: str, widths: Array) -> None:
-        self._column = MOTOR[motor]
-        self._half = np.asarray(widths) / 2.0
-        self._link: Array | None = None
+    component: str  # motor
+    widths: Array  # (k,), full widths of the operators [rad]
+    link: Array | None = None  # (k,), where they stand [rad]
 
     def turn(self, time_s: Array, shaft: Array) -> Array:
         """Drag the link within the play."""
-        x = shaft[:, self._column]
-        link = np.full(len(self._half), x[0]) if self._link is None else self._link
+        column, half = MOTOR[self.component], self.widths / 2.0
+        x = shaft[:, column]
+        link = np.full(len(half), x[0]) if self.link is None else self.link
         out = np.zeros_like(shaft)
         for i, angle in enumerate(x):
-            link = np.clip(link, angle - self._half, angle + self._half)
-            out[i, self._column] = link.mean() - angle
-        self._link = link
+            link = np.clip(link, angle - half, angle + half)
+            out[i, column] = link.mean() - angle
+        self.link = link
         return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import exp, hypot
 
 import numpy as np
@@ -14,6 +15,9 @@ from wrist_stiffness.simulation.equilibrium import Equilibrium
 from wrist_stiffness.simulation.laws.law import JOINED, Rubbing
 from wrist_stiffness.simulation.seat import Seat
 
+STRIBECK_SPEED = 5e-5
+"""Slip at which the budget has fallen to that of motion [m/s]."""
+
 BUDGET_TOLERANCE = 1e-12
 """Error of the friction of a joint that slips, relative to its budget."""
 
@@ -21,6 +25,7 @@ Pair = tuple[float, float]
 """Along the slide and round it [m] or [N]."""
 
 
+@dataclass
 class JointFriction(Rubbing):
     """Elasto-plastic friction of a cylindrical joint with one budget for slide and turn.
 
@@ -28,28 +33,15 @@ class JointFriction(Rubbing):
     until its length reaches the budget mu N + p0, N being the sum of the radial reactions at both
     ends of the bushing; from then on they are dragged along.  A joint that turns therefore has
     little friction left along its axis; one at rest locks its slide.
-
-    `joint`: passive joint; `mu`: coefficient of friction [-]; `preload`: p0, the budget of the
-    unloaded joint [N]; `stiffness`: sigma, of the bristles [N/m]; `stribeck`: how much more the
-    budget is at rest than in motion [-].
     """
 
-    STRIBECK_SPEED = 5e-5
-    """Slip at which the budget has fallen to that of motion [m/s]."""
-
-    def __init__(
-        self,
-        joint: str,
-        seat: Seat,
-        mu: float,
-        preload: float,
-        stiffness: float,
-        stribeck: float,
-    ) -> None:
-        self.component = joint
-        self.seat, self._mu, self._preload = seat, mu, preload
-        self.stiffness, self._stribeck = stiffness, stribeck
-        self._state: tuple[float, Pair, Pair] | None = None
+    component: str  # passive joint
+    seat: Seat  # of its bushing
+    mu: float  # coefficient of friction [-]
+    preload: float  # p0, the budget of the unloaded joint [N]
+    stiffness: float  # sigma, of the bristles [N/m]
+    stribeck: float  # how much more the budget is at rest than in motion [-]
+    past: tuple[float, Pair, Pair] | None = None  # time [s], slip [m] and bristles [m]
 
     def rub(
         self, block: Block, give: Array, state: Equilibrium, acting: Array, remember: bool
@@ -63,10 +55,8 @@ class JointFriction(Rubbing):
         give = give[:, j] * to_slip[:, None] * to_slip
         free = path - (give @ (acting / to_slip)[..., None])[..., 0]
         budget = self.budget(self.reaction(block, state.through[:, ELASTIC.index(joint)]))
-        if self._state is None:
-            before, past, bristle = float(block.time_s[0]), (path[0, 0], path[0, 1]), (0.0, 0.0)
-        else:
-            before, past, bristle = self._state
+        start = float(block.time_s[0]), (path[0, 0], path[0, 1]), (0.0, 0.0)
+        before, past, bristle = self.past or start
         out = np.empty_like(path)
         # Plain numbers: the history goes sample by sample, and arrays of two are slow.
         for i, (now, to, soft, slow) in enumerate(
@@ -76,14 +66,14 @@ class JointFriction(Rubbing):
             force = _implicit(self.stiffness, soft, pull)
             at = _given(soft, force, to)
             speed = hypot(at[0] - past[0], at[1] - past[1]) / max(now - before, 1e-9)
-            most = slow * (1.0 + self._stribeck * exp(-speed / self.STRIBECK_SPEED))
+            most = slow * (1.0 + self.stribeck * exp(-speed / STRIBECK_SPEED))
             if hypot(*force) > most:
                 force = _dragged(most, self.stiffness, soft, pull)
             out[i] = force
             bristle = -force[0] / self.stiffness, -force[1] / self.stiffness
             before, past = now, _given(soft, force, to)
         if remember:
-            self._state = before, past, bristle
+            self.past = before, past, bristle
         return out * to_slip
 
     def turn_of(self, block: Block) -> Array:
@@ -92,7 +82,7 @@ class JointFriction(Rubbing):
 
     def budget(self, reaction: Array) -> Array:
         """Friction in motion for a reaction (...) [N]."""
-        return self._preload + self._mu * reaction
+        return self.preload + self.mu * reaction
 
     def reaction(self, block: Block, through: Array) -> Array:
         """Sum of the radial forces at both ends of the bushing, (n,) [N], for its wrench (n, 6)."""

@@ -113,15 +113,12 @@ class Rubbing(Law):
     """
 
 
+@dataclass(frozen=True)
 class UniformSoftness(Law):
-    """Another modulus: all of a part's flexibility, its flanges included, grows alike.
+    """Another modulus: all of a part's flexibility, its flanges included, grows alike."""
 
-    `fraction`: extra flexibility of a link or joint over that of the base, > -1 [-].
-    """
-
-    def __init__(self, component: str, fraction: float) -> None:
-        super().__init__(component)
-        self.fraction = fraction
+    component: str  # link or joint
+    fraction: float  # extra flexibility over that of the base, > -1 [-]
 
     def parts(self, parts: ElasticComponents) -> ElasticComponents:
         """Scale flexibility and flanges."""

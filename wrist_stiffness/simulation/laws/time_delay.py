@@ -9,6 +9,7 @@ sampled at 10 Hz is wrong by an eighth of what a delay of 5 ms does.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,33 +21,31 @@ from wrist_stiffness.simulation.laws.law import MOTOR, Law
 from wrist_stiffness.simulation.program import Program
 
 
+@dataclass
 class DelayLine:
-    """Signals some time ago, by linear interpolation between the samples that were.
+    """Signals some time ago, by linear interpolation between the samples that were."""
 
-    `delay_s` [s].
-    """
-
-    def __init__(self, delay_s: float) -> None:
-        self._delay_s = delay_s
-        self._start_s: float | None = None
-        self._time_s = np.zeros(0)
-        self._values: Array | None = None
+    delay_s: float  # [s]
+    start_s: float | None = None  # stamp of the first sample [s]
+    # stamps (k,) [s] and values (k, d) of the samples that may still be asked for
+    samples: tuple[Array, Array] | None = None
 
     def moments(self, time_s: Array) -> Array:
         """Return the moments (n,) that samples stamped (n,) show; none is before the start [s]."""
-        if self._start_s is None:
-            self._start_s = float(time_s[0])
-        return np.maximum(time_s - self._delay_s, self._start_s)
+        if self.start_s is None:
+            self.start_s = float(time_s[0])
+        return np.maximum(time_s - self.delay_s, self.start_s)
 
     def __call__(self, time_s: Array, values: Array) -> Array:
         """Return the values (n, d) as they were; before the start, the first one."""
-        known = values if self._values is None else np.concatenate([self._values, values])
-        times = np.concatenate([self._time_s, time_s])
+        times, known = time_s, values
+        if self.samples is not None:
+            times, known = map(np.concatenate, zip(self.samples, (time_s, values), strict=True))
         wanted = self.moments(time_s)
         out = np.column_stack([np.interp(wanted, times, column) for column in known.T])
         # One sample before the oldest that can still be asked for has to stay.
-        first = max(int(np.searchsorted(times, times[-1] - self._delay_s)) - 1, 0)
-        self._time_s, self._values = times[first:], known[first:]
+        first = max(int(np.searchsorted(times, times[-1] - self.delay_s)) - 1, 0)
+        self.samples = times[first:], known[first:]
         return out
 
     def past(self, time_s: Array, values: Array, nominal: Callable[[Array], Array]) -> Array:
