@@ -1,6 +1,7 @@
 """Laws that nobody wrote are found in what a model leaves: form, component, direction and size."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import CellSettings
 
 SECONDS = 120.0
@@ -36,11 +38,18 @@ def day(model, in_the_cell):
     return replace(session, block=replace(session.block, covariates={"clamp_bar": bar}))
 
 
+@cache
+def base_on(session):
+    """Effects of the wrist as it is on a day: what a fit of the shipped model finds."""
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+    return WristProblem(model, (as_units(model, session),)).begin().base.effects(0)
+
+
 def planted(model, session, place, direction, text, *others, **sizes):
     """The session with a law of the user's more in the wrist, and other effects."""
     law = FormulaLaw("planted", place, np.array(direction), text, ("clamp_bar",), tuple(sizes))
     # Beside the wrist as it is: a turn about a target that sits a millimetre off moves it as well.
-    wrist = WristProblem(model, (as_units(model, session),)).begin().base.effects(0)
+    wrist = base_on(session)
     effects = (*wrist, effect_at(law, place, sizes), *others)
     bare, grown = model.with_effects().batch_with(session.block, [wrist, effects])
     change = grown.measured - bare.measured
