@@ -18,6 +18,8 @@ from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
 from wrist_stiffness.web.figures import over_time
 
+pytestmark = pytest.mark.slow
+
 PLAY = "backlash@motor_2"
 
 
@@ -67,7 +69,6 @@ def fitted(monkeypatch):
     return found
 
 
-@pytest.mark.slow
 def test_the_error_falls_with_what_is_added(model, sessions, fitted):
     analysis = Analysis(model, sessions)
     assert analysis.versions[0].held_out["s_um"] > 100.0

@@ -113,6 +113,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_an_interrupt_at_the_terminal_ends_all_without_a_word(tmp_path):
     """Ctrl-C goes to every process of the terminal; each worker ended with a traceback."""
     program = tmp_path / "hanging.py"

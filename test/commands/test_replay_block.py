@@ -192,6 +192,7 @@ TOPICS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "follow", "step_ns"),
     # A model with a memory goes sample by sample in a replay as well: a quarter of them will do.

@@ -261,6 +261,7 @@ def compared(dwells, *sizes):
     return Comparison(("day",), tuple(models), {}, {})
 
 
+@pytest.mark.slow
 def test_headroom_is_the_share_of_what_could_fall(dwells):
     found = compared(dwells, 10.0, 4.0, 0.0)
     assert found.headroom(found.models[2], "s_um") == pytest.approx(1.0, abs=0.05)

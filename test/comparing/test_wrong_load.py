@@ -39,6 +39,7 @@ def of_a_wrong_base(in_the_cell, table, hidden=()):
     return in_the_cell(table, settings, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sign", "hidden", "words"),
     [
@@ -61,6 +62,7 @@ def test_parts_that_answer_loads_as_none_does_ask_for_a_wrong_load(
     assert words in told if words else told == ""
 
 
+@pytest.mark.slow
 def test_a_load_in_kN_is_told_of_a_tracker_on_a_wrist_within_its_tolerances(model, in_the_cell):
     settings = CellSettings(rate_hz=20.0, program_seconds=60.0, instrument="tracker", base="wrong")
     sound = in_the_cell(model.table, settings, 3)

@@ -77,6 +77,7 @@ def effect(law, place, **values):
     return Effect(find_law(law), place, {key: Estimate(value) for key, value in values.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", ["rich", "production"])
 def test_slopes_that_lead_no_further_do_not_end_a_calibration(model, in_the_cell, program):
     """The first needs wide differences, the second a wrist within its tolerances to begin with."""

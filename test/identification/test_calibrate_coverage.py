@@ -50,6 +50,7 @@ def test_errors_of_stiffness_are_as_large_as_their_uncertainties(in_the_cell):
     assert np.abs(errors).max() < FARTHEST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1002, 1004])
 def test_the_platform_is_off_by_what_is_stated_and_not_by_what_an_instrument_sees(
     in_the_cell, seed

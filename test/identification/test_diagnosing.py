@@ -75,7 +75,6 @@ def test_a_sound_wrist_whose_fit_stops_at_a_kink_misses_nothing(model, in_the_ce
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "readings"), [(1, 2), (3, 2), (4, 2), (1, 3), (3, 3)])
 def test_a_sound_wrist_read_a_few_times_at_each_rest_misses_nothing(
     model, in_the_cell, seed, readings

@@ -298,6 +298,7 @@ def test_two_sessions_have_registrations_of_their_own_and_one_wrist(model):
     assert newest.estimates["shift_x_um"].value == pytest.approx(tuesday.value)
 
 
+@pytest.mark.slow
 def test_what_makes_another_day_worse_is_not_handed_over(model):
     """Of two wrists the first one's axis is no knowledge of the second."""
     rng = np.random.default_rng(4)

@@ -23,6 +23,8 @@ from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import CellSettings
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 120.0
 
 

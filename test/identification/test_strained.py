@@ -52,6 +52,7 @@ def test_bores_that_are_tilted_where_they_are_are_within_their_tolerances(model,
     assert found.chance > 0.1
 
 
+@pytest.mark.slow
 def test_parts_that_are_each_a_little_soft_are_too_much_together(model, day):
     """Each within two and a half standard deviations, which alarms nobody."""
     laws = [find_law(f"{kind}_stiffness") for kind in ("link", "bushing")]
