@@ -34,7 +34,7 @@ from wrist_stiffness.recording.messages import (
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import QUANTITIES
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.simulation.cell import SENSED, VirtualCell
+from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
 
 START_NS = 1_700_000_000_000_000_000
@@ -162,6 +162,18 @@ def table():
 @pytest.fixture(scope="session")
 def model():
     return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+def wrong_wrist(seconds, program_seed, base_seed, rate_hz=10.0, **more):
+    """Return settings of the cell with a wrist that is off its drawing."""
+    return CellSettings(
+        rate_hz=rate_hz,
+        program_seconds=seconds,
+        program_seed=program_seed,
+        base="wrong",
+        base_seed=base_seed,
+        **more,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from measured_wrist import wrong_wrist
 
 from wrist_stiffness.commands import diagnose
 from wrist_stiffness.commands.diagnose import mistake_beside
@@ -28,14 +29,7 @@ def explained(base, absorbed, findings=()):
 
 
 def of_a_wrong_base(in_the_cell, table, hidden=()):
-    settings = CellSettings(
-        rate_hz=10.0,
-        program_seconds=60.0,
-        program_seed=41,
-        base="wrong",
-        base_seed=3,
-        hidden=hidden,
-    )
+    settings = wrong_wrist(60.0, 41, 3, hidden=hidden)
     return in_the_cell(table, settings, 3)
 
 

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from measured_wrist import wrong_wrist
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.extend import direction_of
@@ -21,7 +22,6 @@ from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.simulation.cell import CellSettings
 
 pytestmark = pytest.mark.slow
 
@@ -31,9 +31,7 @@ SECONDS = 120.0
 @pytest.fixture(scope="module")
 def day(model, in_the_cell):
     """A sound wrist beside a clamp that opens and closes on its own."""
-    settings = CellSettings(
-        rate_hz=10.0, program_seconds=SECONDS, program_seed=41, base="wrong", base_seed=3
-    )
+    settings = wrong_wrist(SECONDS, 41, 3)
     session = in_the_cell(model.table, settings, 5)
     turns = np.random.default_rng(2).uniform(0.0, 6.0, int(SECONDS / 8.0) + 1)
     bar = turns[(session.block.time // 8.0).astype(int)]
@@ -59,15 +57,12 @@ def planted(model, session, place, direction, text, *others, **sizes):
     return replace(session, shift=session.shift + change[:, :3], rotation=turned)
 
 
-@pytest.fixture
-def first_alone(monkeypatch):
-    """No second law is asked beside the first: it takes longer, and changes nothing of that."""
-    monkeypatch.setattr(proposing, "MOST_TERMS", 1)
-
-
-def proposed(model, session):
+def proposed(model, session, most=1):
+    """A second law takes longer, and changes nothing of the first."""
     problem = WristProblem(model, (as_units(model, session),))
-    return propose(problem, problem.begin())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(proposing, "MOST_TERMS", most)
+        return propose(problem, problem.begin())
 
 
 def test_noise_and_tolerances_are_no_law(model, day):
@@ -103,7 +98,7 @@ def test_a_late_clamp_under_the_frame_is_found_and_can_be_added(model, day):
     session = planted(
         model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * lag(clamp_bar, 4)", lift_um=0.8
     )
-    found = proposed(model, session)
+    found = proposed(model, session, most=2)
     assert found.probability > 0.99
     assert found.complete
     (law,) = found.terms
@@ -127,7 +122,6 @@ def test_a_late_clamp_under_the_frame_is_found_and_can_be_added(model, day):
     assert "--component frame" in told
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_a_wave_of_the_difference_of_the_angles_in_a_link_is_found_there(model, day):
     text = "turn_mdeg * sin(18 * (theta_1 - theta_2) + 0.5)"
     session = planted(model, day, "link_3", [0, 0, 0, 0, 1.0, 0], text, turn_mdeg=40.0)
@@ -141,7 +135,6 @@ def test_a_wave_of_the_difference_of_the_angles_in_a_link_is_found_there(model, 
     assert found.places["link_3"] > 0.9
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_a_dent_in_a_passive_joint_is_found_at_its_angle(model, day):
     text = "lift_um * exp(-((turn_3 - 0.1) ** 2) / 0.005)"
     session = planted(model, day, "joint_3", [0, 0.8, 0.6, 0, 0, 0], text, lift_um=20.0)
@@ -153,7 +146,6 @@ def test_a_dent_in_a_passive_joint_is_found_at_its_angle(model, day):
     assert "deg of joint_3" in law.sentence
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_what_pulls_at_the_platform_is_a_wrench_that_the_sensor_does_not_say(model, day):
     # A small one: under newtons flanges close, and slopes tell little.
     text = "pull_N * sin(14 * theta_1)"
@@ -169,7 +161,6 @@ def test_what_pulls_at_the_platform_is_a_wrench_that_the_sensor_does_not_say(mod
     assert added.after.rmse(added.quantities[0]) < 0.8 * added.before.rmse(added.quantities[0])
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_what_answers_to_both_speeds_is_one_law_that_can_be_added(model, day, tmp_path):
     """A rotor on the tool: either speed alone is explained better by another component."""
     text = "spin_Nmm * theta_dot_1, spin_Nmm * theta_dot_2"
@@ -191,7 +182,6 @@ def test_what_answers_to_both_speeds_is_one_law_that_can_be_added(model, day, tm
     assert load_model(path).effects[0].law.direction == pytest.approx(law.direction)
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_a_clamp_that_comes_loose_is_told_by_all_forces_and_the_time(model, day):
     text = ", ".join(f"soft_um * f{axis} * (time - {day.block.time[0]:.3f})" for axis in "xyz")
     ways = np.concatenate([[[0.6, 0, 0], [0, 1.0, 0.3], [0, 0.3, 0.8]], np.zeros((3, 3))], axis=1)
@@ -200,7 +190,6 @@ def test_a_clamp_that_comes_loose_is_told_by_all_forces_and_the_time(model, day)
     assert "link_3" in (found.terms[0].component, *twins(found.terms[0].component))
 
 
-@pytest.mark.usefixtures("first_alone")
 @pytest.mark.parametrize(
     ("text", "kind"),
     [
@@ -256,7 +245,6 @@ def test_a_search_out_of_fits_is_followed_by_a_law_all_the_same(model, day, monk
     assert found.proposals is nothing
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_what_gives_under_its_own_load_is_told_by_the_load_through_it(model, day):
     # The moment through joint_1 about its own axis; that on the platform turns with the pose.
     text = "gives_mdeg * tanh(mx / 0.01)"
@@ -273,7 +261,7 @@ def test_what_gives_under_its_own_load_is_told_by_the_load_through_it(model, day
 def test_a_shift_and_a_turn_together_are_one_law_that_can_be_added(model, day):
     text = "lift_um * exp(-((turn_2 - 0.05) ** 2) / 0.01)"
     session = planted(model, day, "joint_2", [0, 0.6, 0.8, 0, 0, 20.0], text, lift_um=15.0)
-    found = proposed(model, session)
+    found = proposed(model, session, most=2)
     (law,) = found.terms
     assert law.form.name == "a spot of turn_2"
     assert law.probability > 0.9
@@ -285,7 +273,6 @@ def test_a_shift_and_a_turn_together_are_one_law_that_can_be_added(model, day):
     assert added.after.rmse(added.quantities[0]) < 0.8 * added.before.rmse(added.quantities[0])
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_a_law_beside_something_that_follows_none_is_told_as_less_sure(model, day):
     """What a law leaves above the noise may as well be what is missing itself."""
     lift = model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * clamp_bar"
@@ -300,7 +287,6 @@ def test_a_law_beside_something_that_follows_none_is_told_as_less_sure(model, da
     assert unsure.probability < 0.8
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_what_is_otherwise_beyond_a_line_across_the_workspace(model, day):
     text = "hop_um * tanh((0.8 * theta_1 - 0.6 * theta_2 - 0.1) / 0.03)"
     session = planted(model, day, "frame", [0.6, 0, 0.8, 0, 0, 0], text, hop_um=8.0)
@@ -312,7 +298,6 @@ def test_what_is_otherwise_beyond_a_line_across_the_workspace(model, day):
     assert abs(law.value * law.direction[0, :3]) == pytest.approx([4.8, 0.0, 6.4], abs=1.5)
 
 
-@pytest.mark.usefixtures("first_alone")
 def test_what_comes_with_time_is_not_put_down_to_a_thermometer_that_hardly_moved(model, day):
     grown = np.linspace(20.0, 20.01, len(day.block))
     block = replace(day.block, temperatures={"frame": grown, "link_3": grown + 0.001})
