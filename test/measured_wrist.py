@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.lookup.table_file import load_table
+from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.recording import RecordingWriter
@@ -33,7 +34,7 @@ from wrist_stiffness.recording.messages import (
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import QUANTITIES
 from wrist_stiffness.shipped import shipped_file
-from wrist_stiffness.simulation.cell import SENSED, VirtualCell
+from wrist_stiffness.simulation.cell import SENSED, CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import instrument
 
 START_NS = 1_700_000_000_000_000_000
@@ -43,10 +44,32 @@ MOTORS = ("motor_1_joint", "motor_2_joint")
 SCATTER = np.repeat([1e-6, 1e-4], 3)
 """Of each component of a dwell in a table made by hand [m, rad]."""
 
+POSE_SCATTER = np.repeat([1e-6, np.radians(2e-3)], 3)
+"""Of each component of poses that are measured one by one [m, rad]."""
+
 
 def pose_of(rotation, shift):
     quaternion = Rotation.from_matrix(rotation).as_quat().tolist()
     return Pose(Point(*np.asarray(shift).tolist()), Quaternion(*quaternion))
+
+
+def random_poses(rng, n, force, moment=0.01):
+    """Return poses one by one, each under a load of its own [N], [N m]."""
+    theta = np.radians(rng.uniform(-30.0, 30.0, (n, 2)))
+    load = rng.normal(size=(n, 6)) * np.repeat([force, moment], 3)
+    return Block(2.0 * np.arange(n), theta, load)
+
+
+def measured_in(model, block, rng, hidden_counts=False, **more):
+    """Return a session in which the wrist is the model; hidden counts turn its encoders."""
+    scattered = model.batch(block).measured + rng.normal(size=(len(block), 6)) * POSE_SCATTER
+    rotation, shift = exp_twist(scattered)
+    theta = block.theta
+    if hidden_counts:
+        step = model.table.geometry.limits.encoder_step
+        theta = theta + step * rng.uniform(-0.5, 0.5, theta.shape)
+    rotation = rotation @ model.table.mechanism.forward(theta).platform
+    return MeasuredSession("day", block, shift, rotation, np.diag(POSE_SCATTER**2), **more)
 
 
 @dataclass
@@ -139,6 +162,18 @@ def table():
 @pytest.fixture(scope="session")
 def model():
     return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+def wrong_wrist(seconds, program_seed, base_seed, rate_hz=10.0, **more):
+    """Return settings of the cell with a wrist that is off its drawing."""
+    return CellSettings(
+        rate_hz=rate_hz,
+        program_seconds=seconds,
+        program_seed=program_seed,
+        base="wrong",
+        base_seed=base_seed,
+        **more,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -2,17 +2,16 @@
 
 import copy
 import json
-import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 import yaml
+from waiting import wait_until
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.lookup.response import rated_map
@@ -123,7 +122,6 @@ def test_a_stopped_build_says_what_it_keeps(tmp_path):
     """Stopped by a real signal as soon as one part is condensed."""
     pytest.importorskip("netgen")
     command = [sys.executable, "-m", "wrist_stiffness", "table", "build", "-o", tmp_path / "t.npz"]
-    end_s = time.monotonic() + DEADLINE_S
     with subprocess.Popen(
         command,
         stderr=subprocess.PIPE,
@@ -132,10 +130,7 @@ def test_a_stopped_build_says_what_it_keeps(tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
         try:
-            while not (kept := list(tmp_path.glob(".t.parts/*.npz"))):
-                assert process.poll() is None
-                assert time.monotonic() < end_s
-                os.sched_yield()
+            kept = wait_until(lambda: list(tmp_path.glob(".t.parts/*.npz")), process, DEADLINE_S)
             process.send_signal(signal.SIGINT)
             _, said = process.communicate(timeout=DEADLINE_S)
         finally:

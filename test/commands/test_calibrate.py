@@ -36,7 +36,7 @@ def recorded(folder, session, seconds, **settings):
 @pytest.mark.slow
 def test_a_wrong_wrist_is_calibrated_to_the_noise_of_a_day_not_seen(tmp_path, capsys):
     """Stiffness +-30 %, axes +-30 um and 0.05 deg, registrations of 1 mm and 0.2 deg each day."""
-    days = [recorded(tmp_path, day, 100.0, base="wrong") for day in (0, 1)]
+    days = [recorded(tmp_path, day, 60.0, base="wrong") for day in (0, 1)]
     output, report = tmp_path / "mine.yaml", tmp_path / "mine.json"
     # Named in the wrong order: the stamps tell which was last.
     fit = ["--fit", str(days[1]), str(days[0])]

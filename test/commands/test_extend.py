@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from measured_wrist import measured_in, random_poses
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands import extend as workflow
@@ -19,13 +20,10 @@ from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import calibrate
-from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.model.python_laws import python_laws
 from wrist_stiffness.model.registry import effect_named
 from wrist_stiffness.report.fit_lines import extension_lines
-from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.instrument import instrument
 
@@ -37,8 +35,6 @@ BUILT = [
     *("axis_misalignment", "flange_contact", "link_stiffness", "bushing_stiffness"),
     "load_scale",
 ]
-
-SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 
 OWN = '''
 import numpy as np
@@ -69,15 +65,10 @@ class Bow(Law):
 def session_of(model, effect, seed=1, n=60):
     """Return poses of a wrist with one effect, measured one by one; all but the zeros are known."""
     rng = np.random.default_rng(seed)
-    theta = np.radians(rng.uniform(-30.0, 30.0, (n, 2)))
-    load = rng.normal(size=(n, 6)) * np.repeat([0.7, 0.01], 3)
-    block = Block(2.0 * np.arange(n), theta, load, covariates={"humidity": rng.uniform(30, 60, n)})
-    twist = model.with_effects(effect).batch(block).measured + rng.normal(size=(n, 6)) * SIGMA
-    rotation, shift = exp_twist(twist)
-    counts = model.table.geometry.limits.encoder_step * rng.uniform(-0.5, 0.5, theta.shape)
-    nominal = model.table.mechanism.forward(theta + counts).platform
+    block = random_poses(rng, n, 0.7)
+    block = replace(block, covariates={"humidity": rng.uniform(30, 60, n)})
     notes = {"calibrated": [*SET_UP, *BUILT]}
-    return MeasuredSession("s", block, shift, rotation @ nominal, np.diag(SIGMA**2), notes)
+    return measured_in(model.with_effects(effect), block, rng, hidden_counts=True, notes=notes)
 
 
 @pytest.fixture
@@ -180,7 +171,7 @@ def test_a_python_class_is_fitted_written_and_read_again(model, extend_by, tmp_p
     with python_laws(True):
         again = load_model(output)
     assert again.effects[-1].name == "bow@platform"
-    assert again.lineage[-1].recordings == {"s": file_sha256(tmp_path / "s.mcap")}
+    assert again.lineage[-1].recordings == {"day": file_sha256(tmp_path / "s.mcap")}
     assert again.lineage[-1].parent_sha256 == file_sha256(
         shipped_file("config/palmieri2015_model.yaml")
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from measured_wrist import measured_in, random_poses
 
 from wrist_stiffness.commands import calibrate as calibrating
 from wrist_stiffness.commands import extend as extending
@@ -16,19 +17,15 @@ from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.identification.extension import base_beside
 from wrist_stiffness.identification.free_effects import unfitted
-from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import effect_named, find_law
-from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015_model.yaml")
 RUN = Run("extend ...", "2026-01-01T00:00:00+00:00")
-SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 GAPS = "flange_contact"
 KNOWN = ["measurement_frame", "target_mounting", "axis_misalignment", GAPS]
 
@@ -42,15 +39,9 @@ def recorded(tmp_path, monkeypatch):
     """Return a day's file and session of a wrist with a bushing that gave way."""
     model = load_model(SHIPPED)
     rng = np.random.default_rng(1)
-    theta = np.radians(rng.uniform(-30.0, 30.0, (80, 2)))
-    load = rng.normal(size=(80, 6)) * np.repeat([0.7, 0.01], 3)
-    block = Block(2.0 * np.arange(80), theta, load)
     soft = effect(SOFT).with_values({"flexibility_percent": SOFTER_PERCENT})
-    twist = model.with_effects(soft).batch(block).measured + rng.normal(size=(80, 6)) * SIGMA
-    rotation, shift = exp_twist(twist)
-    rotation = rotation @ model.table.mechanism.forward(theta).platform
-    notes = {"calibrated": KNOWN}
-    day = MeasuredSession("day", block, shift, rotation, np.diag(SIGMA**2), notes)
+    poses, notes = random_poses(rng, 80, 0.7), {"calibrated": KNOWN}
+    day = measured_in(model.with_effects(soft), poses, rng, notes=notes)
     path = tmp_path / "day.mcap"
     path.write_bytes(b"measured")
     for workflow in (calibrating, extending):

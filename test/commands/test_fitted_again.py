@@ -1,9 +1,11 @@
 """A recording is no knowledge twice: what a fit found in it does not hide what is missing."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from measured_wrist import measured_in, random_poses
 
 from wrist_stiffness.commands import calibrate, extend
 from wrist_stiffness.commands.calibrate import calibrate_model
@@ -11,17 +13,13 @@ from wrist_stiffness.commands.extend import extend_model
 from wrist_stiffness.commands.provenance import Run
 from wrist_stiffness.commands.read_sessions import Recordings
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import effect_named, find_law
-from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015_model.yaml")
 RUN = Run("...", "2026-01-01T00:00:00+00:00")
-SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 KNOWN = [
     *("measurement_frame", "target_mounting", "encoder_offset", "axis_misalignment"),
     *("flange_contact", "bushing_stiffness", "link_stiffness"),
@@ -40,17 +38,11 @@ def recorded(tmp_path, monkeypatch):
 
     def day(number):
         rng = np.random.default_rng(number)
-        theta = np.radians(rng.uniform(-30.0, 30.0, (60, 2)))
-        load = rng.normal(size=(60, 6)) * np.repeat([0.7, 0.01], 3)
-        block = Block(2.0 * np.arange(60), theta, load)
-        twist = model.with_effects(mass).batch(block).measured + rng.normal(size=(60, 6)) * SIGMA
-        rotation, shift = exp_twist(twist)
-        rotation = rotation @ model.table.mechanism.forward(theta).platform
         path = tmp_path / f"day_{number}.mcap"
         path.write_bytes(bytes([number]))
-        noise = np.diag(SIGMA**2)
-        notes = {"calibrated": KNOWN}
-        days[path] = MeasuredSession(path.name, block, shift, rotation, noise, notes)
+        heavy, notes = model.with_effects(mass), {"calibrated": KNOWN}
+        session = measured_in(heavy, random_poses(rng, 60, 0.7), rng, notes=notes)
+        days[path] = replace(session, name=path.name)
         return path
 
     def read(recordings, *_):

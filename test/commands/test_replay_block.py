@@ -1,6 +1,8 @@
 """A replay in blocks: what a node would have sent, to the bit, also of a recording with faults."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.stream import PredictionStream
 from wrist_stiffness.errors import WristError
 from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.recording import chunk_writer
 from wrist_stiffness.recording.messages import (
     Float64,
     Header,
@@ -24,7 +27,7 @@ from wrist_stiffness.recording.messages import (
     Wrench,
     WrenchStamped,
 )
-from wrist_stiffness.recording.reader import open_recording
+from wrist_stiffness.recording.reader import Recording, open_recording
 from wrist_stiffness.recording.writer import RecordingWriter
 from wrist_stiffness.ros.stream_messages import (
     JointSample,
@@ -54,30 +57,40 @@ effects:
   expression: "drag_um * theta_dot_1"
   parameters: {{drag_um: 1.0}}
 """
-STEP_NS = 2_000_000
-SAMPLES = 2600
-FAR, HEAVY, LATE, GAP, JUMP, EMPTY = 300, 500, 700, 900, 2400, 2500
-"""Samples at which: the pose is out of the domain, the load beyond the table, a load comes after
+STEP_NS, DURATION_NS = 2_000_000, 5_200_000_000
+FAR, HEAVY, LATE, GAP, JUMP, EMPTY = 0.6, 1.0, 1.4, 1.8, 4.8, 5.0
+"""Seconds at which: the pose is out of the domain, the load beyond the table, a load comes after
 its joint state, loads are missing for a second, the clock jumps back, a command is not finite."""
 
 
-def signals(seed=5):
-    """Return stamps [ns], angles [rad] and wrenches of a path with faults; NaN where none came."""
-    rng = np.random.default_rng(seed)
-    stamps = STEP_NS * np.arange(1, SAMPLES + 1)
-    stamps[JUMP:] -= 600 * STEP_NS
-    second = 1e-3 * np.arange(SAMPLES)
-    theta = 0.5 * np.stack([np.sin(9.0 * second), np.cos(7.0 * second)], axis=1)
-    theta[FAR : FAR + 3] = 0.95
-    wrench = np.zeros((SAMPLES, 6))
-    # Nothing, then a weight, then a push aside.
-    wrench[400:, 2] = -0.8
-    wrench[750:850, 0] = 0.5
-    wrench[1600:1900, 0] = 0.5
-    wrench += 1e-4 * rng.normal(size=wrench.shape)
-    wrench[HEAVY : HEAVY + 3] *= 1000.0
-    wrench[GAP : GAP + 500] = np.nan
-    return stamps, theta, wrench
+@dataclass(frozen=True)
+class Signals:
+    """A path with faults, a sample each `step_ns`; NaN where no load came."""
+
+    step_ns: int
+
+    def __len__(self):
+        return DURATION_NS // self.step_ns
+
+    def at(self, seconds):
+        return round(1e9 * seconds / self.step_ns)
+
+    @cached_property
+    def found(self):
+        """Stamps [ns], angles [rad] and wrenches."""
+        stamps = self.step_ns * np.arange(1, len(self) + 1)
+        stamps[self.at(JUMP) :] -= 1_200_000_000
+        second = 1e-9 * self.step_ns * np.arange(len(self))
+        theta = 0.5 * np.stack([np.sin(4.5 * second), np.cos(3.5 * second)], axis=1)
+        theta[self.at(FAR) :][:3] = 0.95
+        wrench = np.zeros((len(self), 6))
+        # Nothing, then a weight, then a push aside.
+        wrench[second >= 0.8, 2] = -0.8
+        wrench[((second >= 1.5) & (second < 1.7)) | ((second >= 3.2) & (second < 3.8)), 0] = 0.5
+        wrench += 1e-4 * np.random.default_rng(5).normal(size=wrench.shape)
+        wrench[self.at(HEAVY) :][:3] *= 1000.0
+        wrench[self.at(GAP) : self.at(GAP + 1.0)] = np.nan
+        return stamps, theta, wrench
 
 
 def speeds(i):
@@ -85,24 +98,24 @@ def speeds(i):
     return (np.nan if i % 97 == 0 else 0.01 * (i % 40), -0.2)
 
 
-def recorded(path):
-    """Write these signals, once a millisecond or so."""
-    stamps, theta, wrench = signals()
+def recorded(path, signals):
+    stamps, theta, wrench = signals.found
+    late, empty = signals.at(LATE), signals.at(EMPTY)
     with RecordingWriter(path) as writer:
-        for i in range(SAMPLES):
-            at_ns, header = STEP_NS * (i + 1), Header(int(stamps[i]))
+        for i in range(len(signals)):
+            at_ns, header = signals.step_ns * (i + 1), Header(int(stamps[i]))
             force, moment = wrench[i, :3].tolist(), wrench[i, 3:].tolist()
             load = WrenchStamped(
                 replace(header, frame_id="wrist_base"), Wrench(Vector3(*force), Vector3(*moment))
             )
-            if np.isfinite(wrench[i]).all() and i != LATE:
+            if np.isfinite(wrench[i]).all() and i != late:
                 writer.write("/load_estimate", load, at_ns)
             angles = tuple(theta[i].tolist())
             writer.write("/joint_states", JointState(header, MOTORS, angles, speeds(i)), at_ns)
-            if i == LATE:
+            if i == late:
                 writer.write("/load_estimate", load, at_ns)
             names = ("other", *MOTORS)
-            first = np.nan if i == EMPTY else 0.5
+            first = np.nan if i == empty else 0.5
             command = JointState(
                 header, names, (first, *angles), (9.0, *speeds(i)), (1.0, 2.0, 3.0)
             )
@@ -115,20 +128,21 @@ def recorded(path):
     return path
 
 
-def wanted(path, settings):
+def wanted(path, settings, signals):
     """Return the payloads that nodes would send by topic and what they refuse, one by one."""
     prediction, correction = settings
     model = load_model(path)
     predicting = PredictionStream(model, prediction)
     correcting = CorrectionStream(model, correction, enabled=True)
-    stamps, theta, wrench = signals()
+    stamps, theta, wrench = signals.found
+    empty = signals.at(EMPTY)
     sent = {topic: [] for topic in TOPICS}
     pace, drawing = Pace(), WristDrawing(model.table.geometry, 1000.0)
     refused = heard = 0
-    for i in range(SAMPLES):
+    for i in range(len(signals)):
         stamp_ns, angles = int(stamps[i]), theta[i].tolist()
         # A replay hears loads a second ahead: that makes a difference where the clock jumps.
-        while heard < min(SAMPLES, i + 1 + LOOKAHEAD_NS // STEP_NS):
+        while heard < min(len(signals), i + 1 + LOOKAHEAD_NS // signals.step_ns):
             load = wrench[heard].tolist()
             if np.isfinite(load).all():
                 for stream in (predicting, correcting):
@@ -149,7 +163,7 @@ def wanted(path, settings):
                 sent["/wrist_markers"] += drawing.payloads(*one)
         except WristError:
             refused += 1
-        names, first = ("other", *MOTORS), np.nan if i == EMPTY else 0.5
+        names, first = ("other", *MOTORS), np.nan if i == empty else 0.5
         moving = (9.0, *speeds(i))
         try:
             command = correcting.on_command(stamp_ns, "", names, (first, *angles), moving)
@@ -178,13 +192,15 @@ TOPICS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("effects", "follow"),
-    [(False, False), (False, True), (True, False)],
+    ("effects", "follow", "step_ns"),
+    # A model with a memory goes sample by sample in a replay as well: a quarter of them will do.
+    [(False, False, STEP_NS), (False, True, STEP_NS), (True, False, 4 * STEP_NS)],
     ids=["supervised", "every load followed", "effects with a memory"],
 )
-def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, monkeypatch, effects, follow):
-    model, answered = MODEL, []
+def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, monkeypatch, effects, follow, step_ns):
+    model, answered, signals = MODEL, [], Signals(step_ns)
     answer = BlockReplay.answer
 
     def noted(blocks, block):
@@ -192,16 +208,21 @@ def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, monkeypatch, effects, 
         return answered[-1]
 
     monkeypatch.setattr(BlockReplay, "answer", noted)
+    if step_ns > STEP_NS:
+        # Fewer messages at a time too, or all would go by themselves with the clock that jumps.
+        monkeypatch.setattr(Recording.blocks, "__defaults__", (None, 1))
+        monkeypatch.setattr(chunk_writer, "CHUNK_BYTES", chunk_writer.CHUNK_BYTES // 2)
     if effects:
         model = tmp_path / "effects.yaml"
         model.write_text(EFFECTS.format(table=shipped_file("precomputed/palmieri2015.npz")))
     prediction, correction = node_settings(None)
     own = replace(correction, supervisor=SupervisorSettings(follow=follow))
     summary = replay(
-        recorded(tmp_path / "in.mcap"), model, tmp_path / "out.mcap", (prediction, own)
+        recorded(tmp_path / "in.mcap", signals), model, tmp_path / "out.mcap", (prediction, own)
     )
-    assert answered == [True, False]  # before the clock jumps, and around it
-    sent, refused = wanted(model, (prediction, own))
+    # Before the clock jumps, and around it.
+    assert [each for each, _ in groupby(answered)] == [True, False]
+    sent, refused = wanted(model, (prediction, own), signals)
     found = {topic: [] for topic in TOPICS}
     for raw in open_recording(tmp_path / "out.mcap").raw_messages(TOPICS):
         found[raw.channel.topic].append(raw.payload)
@@ -212,11 +233,11 @@ def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, monkeypatch, effects, 
         assert not different, f"{topic}: {len(different)}, the first {different[0]}"
     assert summary.refused.total() == refused > 50
     assert summary.replaced == 1
-    assert 0 < summary.corrections < summary.commands == SAMPLES
+    assert 0 < summary.corrections < summary.commands == len(signals)
 
 
 def test_answers_follow_their_messages_in_time(tmp_path):
-    replay(recorded(tmp_path / "in.mcap"), MODEL, tmp_path / "out.mcap")
+    replay(recorded(tmp_path / "in.mcap", Signals(STEP_NS)), MODEL, tmp_path / "out.mcap")
     at_joints = 0
     before = -1
     for raw in open_recording(tmp_path / "out.mcap").raw_messages():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_wrist import wrong_wrist
 from scipy.stats import rankdata
 
 from wrist_stiffness.comparing.compare import compare_models
@@ -142,9 +143,7 @@ def test_what_a_calibration_could_not_take_up_is_told(model, in_the_cell):
 
 def test_parts_are_no_more_than_the_whole(model, in_the_cell):
     """A wrist off its drawing: laws of turns shift the platform too, by way of the new set-up."""
-    settings = CellSettings(
-        rate_hz=10.0, program_seconds=60.0, program_seed=4, base="wrong", base_seed=4
-    )
+    settings = wrong_wrist(60.0, 4, 4)
     session = in_the_cell(model.table, settings, 4)
     found = compare_models([("drawn", model)], [session]).models[0].explained
     for key, error in found.error.items():
@@ -261,6 +260,7 @@ def compared(dwells, *sizes):
     return Comparison(("day",), tuple(models), {}, {})
 
 
+@pytest.mark.slow
 def test_headroom_is_the_share_of_what_could_fall(dwells):
     found = compared(dwells, 10.0, 4.0, 0.0)
     assert found.headroom(found.models[2], "s_um") == pytest.approx(1.0, abs=0.05)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from measured_wrist import wrong_wrist
 
 from wrist_stiffness.commands import diagnose
 from wrist_stiffness.commands.diagnose import mistake_beside
@@ -28,17 +29,11 @@ def explained(base, absorbed, findings=()):
 
 
 def of_a_wrong_base(in_the_cell, table, hidden=()):
-    settings = CellSettings(
-        rate_hz=10.0,
-        program_seconds=60.0,
-        program_seed=41,
-        base="wrong",
-        base_seed=3,
-        hidden=hidden,
-    )
+    settings = wrong_wrist(60.0, 41, 3, hidden=hidden)
     return in_the_cell(table, settings, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sign", "hidden", "words"),
     [
@@ -61,6 +56,7 @@ def test_parts_that_answer_loads_as_none_does_ask_for_a_wrong_load(
     assert words in told if words else told == ""
 
 
+@pytest.mark.slow
 def test_a_load_in_kN_is_told_of_a_tracker_on_a_wrist_within_its_tolerances(model, in_the_cell):
     settings = CellSettings(rate_hz=20.0, program_seconds=60.0, instrument="tracker", base="wrong")
     sound = in_the_cell(model.table, settings, 3)

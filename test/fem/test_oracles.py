@@ -128,6 +128,7 @@ def test_bonded_sleeve_squeezed_sideways_lies_between_bounds(plain_sleeve):
     assert 0.9 * layer < measured < 1.02 * layer
 
 
+@pytest.mark.slow
 def test_sliding_sleeve_squeezed_sideways_is_lames_annulus(plain_sleeve):
     """Far from its ends: bonded inside, pushed without friction outside, in plane strain.
 
@@ -137,7 +138,7 @@ def test_sliding_sleeve_squeezed_sideways_is_lames_annulus(plain_sleeve):
     inner = dimensions.pin_diameter / 2
     outer = inner + dimensions.wall
     sizes = MeshSettings(
-        link=1.0, bore=1.0, bushing=0.25e-3, bushing_corner=0.25e-3, bushing_arc=1.0e-3
+        link=1.0, bore=1.0, bushing=0.25e-3, bushing_corner=0.25e-3, bushing_arc=1.4e-3
     )
     stiffness = []
     for length in (8e-3, 12e-3):

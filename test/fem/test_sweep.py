@@ -146,6 +146,7 @@ def test_a_tolerance_that_no_grid_meets(values, store, table, monkeypatch):
     assert by_closed_form.header.errors["predicted"]["operative"]["s"] > 0.03
 
 
+@pytest.mark.slow
 def test_mesh_and_rings_are_refined_until_the_tolerance_is_met(values, store, table):
     """On solids whose error is known: too stiff by 3 % at the first mesh, by its powers beyond."""
     first, too_stiff = COARSE.sizes, 0.03

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_wrist import wrong_wrist
 
 from wrist_stiffness.identification.base_fit import best_valley, fit_base, fit_cleaned, free_base
 from wrist_stiffness.identification.free_effects import commissioning
@@ -22,9 +23,7 @@ FRAME = "measurement_frame@pose_sensor"
 @pytest.mark.slow
 def test_no_wrong_flange_catches_the_fit(model, in_the_cell):
     """This base closed a flange that is open when its data were believed at once."""
-    settings = CellSettings(
-        rate_hz=10.0, program_seconds=120.0, program_seed=101, base="wrong", base_seed=1029
-    )
+    settings = wrong_wrist(120.0, 101, 1029)
     units = as_units(model, in_the_cell(model.table, settings, 1))
     found = fit_base(model, (units,))
     assert found.cost < 1.3 * 6 * units.measured.sum()
@@ -77,17 +76,11 @@ def effect(law, place, **values):
     return Effect(find_law(law), place, {key: Estimate(value) for key, value in values.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", ["rich", "production"])
 def test_slopes_that_lead_no_further_do_not_end_a_calibration(model, in_the_cell, program):
     """The first needs wide differences, the second a wrist within its tolerances to begin with."""
-    settings = CellSettings(
-        rate_hz=20.0,
-        program_seconds=60.0,
-        program_seed=6,
-        base="wrong",
-        base_seed=6,
-        experiment=program,
-    )
+    settings = wrong_wrist(60.0, 6, 6, rate_hz=20.0, experiment=program)
     free, held = commissioning(model)
     units = (as_units(model, in_the_cell(model.table, settings, 1)),)
     problem = FitProblem(model.with_effects(*held), units, free)
@@ -105,14 +98,7 @@ def test_wide_differences_lead_past_the_pins_that_turn_over(model, in_the_cell):
         HiddenEffect("joint_clearance", "joint_3", "algebraic", 5e-6, 5),
         HiddenEffect("joint_friction", "joint_2", "coulomb", 0.2, 6),
     )
-    settings = CellSettings(
-        rate_hz=10.0,
-        program_seconds=20.0,
-        program_seed=101,
-        base="wrong",
-        base_seed=1008,
-        hidden=hidden,
-    )
+    settings = wrong_wrist(20.0, 101, 1008, hidden=hidden)
     units = (as_units(model, in_the_cell(model.table, settings, 1)),)
     base = fit_base(model, units)
     extras = [

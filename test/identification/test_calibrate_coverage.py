@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from measured_wrist import wrong_wrist
 
 from wrist_stiffness.identification.calibration import calibrate
 from wrist_stiffness.model.block import Load
@@ -24,9 +25,7 @@ FARTHEST = 4.0
 
 def errors_over_sigma(in_the_cell, model, seed):
     """Return (estimate - truth) / sigma of the flexibility of every part of one wrong wrist."""
-    settings = CellSettings(
-        rate_hz=RATE_HZ, program_seconds=SECONDS, program_seed=seed, base="wrong", base_seed=seed
-    )
+    settings = wrong_wrist(SECONDS, seed, seed)
     session = in_the_cell(model.table, settings, seed)
     found = {
         each.effect.partition("@")[2]: each
@@ -50,6 +49,7 @@ def test_errors_of_stiffness_are_as_large_as_their_uncertainties(in_the_cell):
     assert np.abs(errors).max() < FARTHEST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1002, 1004])
 def test_the_platform_is_off_by_what_is_stated_and_not_by_what_an_instrument_sees(
     in_the_cell, seed

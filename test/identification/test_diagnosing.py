@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_wrist import wrong_wrist
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
@@ -67,23 +68,18 @@ def test_a_wrong_base_alone_is_no_missing_effect(model, in_the_cell):
 @pytest.mark.parametrize("seed", [4, 6, 18])
 def test_a_sound_wrist_whose_fit_stops_at_a_kink_misses_nothing(model, in_the_cell, seed):
     """Of the seeds 1 to 24 these three: slopes from the means end at 3 to 6 times the noise."""
-    settings = CellSettings(
-        rate_hz=10.0, program_seconds=60.0, program_seed=seed, base="wrong", base_seed=seed
-    )
+    settings = wrong_wrist(60.0, seed, seed)
     session = in_the_cell(model.table, settings, 1)
     assert not WristProblem(model, (as_units(model, session),)).begin().rough
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "readings"), [(1, 2), (3, 2), (4, 2), (1, 3), (3, 3)])
 def test_a_sound_wrist_read_a_few_times_at_each_rest_misses_nothing(
     model, in_the_cell, seed, readings
 ):
     """By an instrument that states nothing, 0.4 s apart, as a table of a touch probe holds them."""
-    settings = CellSettings(
-        rate_hz=10.0, program_seconds=240.0, program_seed=seed, base="wrong", base_seed=seed
-    )
+    settings = wrong_wrist(240.0, seed, seed)
     session = in_the_cell(model.table, settings, seed)
     cut = as_units(model, session).cut
     ends = [np.flatnonzero(cut.label == unit)[-1] for unit in np.flatnonzero(cut.dwell)]

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_wrist import POSE_SCATTER as SIGMA
+from measured_wrist import random_poses
 
 from wrist_stiffness.commands.calibrate import Calibrated
 from wrist_stiffness.identification.base_fit import best_valley, fit_cleaned
@@ -26,9 +28,6 @@ from wrist_stiffness.sessions.unit_session import as_units
 from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings, VirtualCell
 from wrist_stiffness.simulation.instrument import LoadSensor, Noise
-
-SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
-"""White scatter of a measured pose in tests with noise of their own [m, rad]."""
 
 FRAME = "measurement_frame@pose_sensor"
 
@@ -71,10 +70,7 @@ def measured(model, block, rng, sigma=SIGMA, drift=0.0):
 
 
 def poses(rng, n=40, load=0.5):
-    """Return poses measured one by one, each under a load of its own."""
-    theta = np.radians(rng.uniform(-30.0, 30.0, (n, 2)))
-    wrench = rng.normal(size=(n, 6)) * np.repeat([load, 0.02 * load], 3)
-    return Block(2.0 * np.arange(n), theta, wrench)
+    return random_poses(rng, n, load, 0.02 * load)
 
 
 def problem_of(model, sessions, free):
@@ -302,6 +298,7 @@ def test_two_sessions_have_registrations_of_their_own_and_one_wrist(model):
     assert newest.estimates["shift_x_um"].value == pytest.approx(tuesday.value)
 
 
+@pytest.mark.slow
 def test_what_makes_another_day_worse_is_not_handed_over(model):
     """Of two wrists the first one's axis is no knowledge of the second."""
     rng = np.random.default_rng(4)

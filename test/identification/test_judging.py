@@ -5,31 +5,29 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from measured_wrist import POSE_SCATTER as SIGMA
+from measured_wrist import random_poses
 
 from wrist_stiffness.identification.base_fit import fit_cleaned
 from wrist_stiffness.identification.free_effects import FreeEffect
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION, Judge
 from wrist_stiffness.identification.problem import FitProblem
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import QUANTITIES, as_units
 
-SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
 POSES = 60
 
 
 def session_of(model, seed):
     """Return poses measured one by one on a wrist that is the model."""
     rng = np.random.default_rng(seed)
-    theta = np.radians(rng.uniform(-30.0, 30.0, (POSES, 2)))
-    load = rng.normal(size=(POSES, 6)) * np.repeat([0.5, 0.01], 3)
-    block = Block(2.0 * np.arange(POSES), theta, load)
+    block = random_poses(rng, POSES, 0.5)
     noise = rng.normal(size=(POSES, 6)) * SIGMA
     rotation, shift = exp_twist(model.batch(block).measured)
-    nominal = model.table.mechanism.forward(theta).platform
+    nominal = model.table.mechanism.forward(block.theta).platform
     return MeasuredSession(
         f"day_{seed}", block, shift + noise[:, :3], rotation @ nominal, np.diag(SIGMA**2)
     )

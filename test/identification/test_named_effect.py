@@ -4,33 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_wrist import measured_in, random_poses
 
 from wrist_stiffness.identification.free_effects import free_all
 from wrist_stiffness.identification.wrist_problem import WristProblem
-from wrist_stiffness.mechanism.rigid_motion import exp_twist
-from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.columns import tangents
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
-from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import as_units
-
-SIGMA = np.repeat([1e-6, np.radians(2e-3)], 3)
-POSES = 60
 
 
 def base_of(model, hidden):
     """Fit registrations alone to poses measured on a wrist that has one effect more."""
     rng = np.random.default_rng(5)
-    theta = np.radians(rng.uniform(-30.0, 30.0, (POSES, 2)))
-    load = rng.normal(size=(POSES, 6)) * np.repeat([0.5, 0.01], 3)
-    block = Block(2.0 * np.arange(POSES), theta, load)
-    true = model.with_effects(hidden).batch(block).measured
-    rotation, shift = exp_twist(true + SIGMA * rng.normal(size=(POSES, 6)))
-    nominal = model.table.mechanism.forward(theta).platform
-    session = MeasuredSession("day", block, shift, rotation @ nominal, np.diag(SIGMA**2))
+    session = measured_in(model.with_effects(hidden), random_poses(rng, 60, 0.5), rng)
     frame = free_all(Effect(find_law("measurement_frame"), "pose_sensor"), per_session=True)
     return WristProblem(model, (as_units(model, session),), ((frame,), ()))
 

@@ -1,9 +1,11 @@
 """Laws that nobody wrote are found in what a model leaves: form, component, direction and size."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
+from measured_wrist import wrong_wrist
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.extend import direction_of
@@ -19,7 +21,9 @@ from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.model_file import load_model, save_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.unit_session import as_units
-from wrist_stiffness.simulation.cell import CellSettings
+from wrist_stiffness.shipped import shipped_file
+
+pytestmark = pytest.mark.slow
 
 SECONDS = 120.0
 
@@ -27,20 +31,25 @@ SECONDS = 120.0
 @pytest.fixture(scope="module")
 def day(model, in_the_cell):
     """A sound wrist beside a clamp that opens and closes on its own."""
-    settings = CellSettings(
-        rate_hz=10.0, program_seconds=SECONDS, program_seed=41, base="wrong", base_seed=3
-    )
+    settings = wrong_wrist(SECONDS, 41, 3)
     session = in_the_cell(model.table, settings, 5)
     turns = np.random.default_rng(2).uniform(0.0, 6.0, int(SECONDS / 8.0) + 1)
     bar = turns[(session.block.time // 8.0).astype(int)]
     return replace(session, block=replace(session.block, covariates={"clamp_bar": bar}))
 
 
+@cache
+def base_on(session):
+    """Effects of the wrist as it is on a day: what a fit of the shipped model finds."""
+    model = load_model(shipped_file("config/palmieri2015_model.yaml"))
+    return WristProblem(model, (as_units(model, session),)).begin().base.effects(0)
+
+
 def planted(model, session, place, direction, text, *others, **sizes):
     """The session with a law of the user's more in the wrist, and other effects."""
     law = FormulaLaw("planted", place, np.array(direction), text, ("clamp_bar",), tuple(sizes))
     # Beside the wrist as it is: a turn about a target that sits a millimetre off moves it as well.
-    wrist = WristProblem(model, (as_units(model, session),)).begin().base.effects(0)
+    wrist = base_on(session)
     effects = (*wrist, effect_at(law, place, sizes), *others)
     bare, grown = model.with_effects().batch_with(session.block, [wrist, effects])
     change = grown.measured - bare.measured
@@ -48,9 +57,12 @@ def planted(model, session, place, direction, text, *others, **sizes):
     return replace(session, shift=session.shift + change[:, :3], rotation=turned)
 
 
-def proposed(model, session):
+def proposed(model, session, most=1):
+    """A second law takes longer, and changes nothing of the first."""
     problem = WristProblem(model, (as_units(model, session),))
-    return propose(problem, problem.begin())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(proposing, "MOST_TERMS", most)
+        return propose(problem, problem.begin())
 
 
 def test_noise_and_tolerances_are_no_law(model, day):
@@ -86,7 +98,7 @@ def test_a_late_clamp_under_the_frame_is_found_and_can_be_added(model, day):
     session = planted(
         model, day, "frame", [0, 0, 1.0, 0, 0, 0], "lift_um * lag(clamp_bar, 4)", lift_um=0.8
     )
-    found = proposed(model, session)
+    found = proposed(model, session, most=2)
     assert found.probability > 0.99
     assert found.complete
     (law,) = found.terms
@@ -249,7 +261,7 @@ def test_what_gives_under_its_own_load_is_told_by_the_load_through_it(model, day
 def test_a_shift_and_a_turn_together_are_one_law_that_can_be_added(model, day):
     text = "lift_um * exp(-((turn_2 - 0.05) ** 2) / 0.01)"
     session = planted(model, day, "joint_2", [0, 0.6, 0.8, 0, 0, 20.0], text, lift_um=15.0)
-    found = proposed(model, session)
+    found = proposed(model, session, most=2)
     (law,) = found.terms
     assert law.form.name == "a spot of turn_2"
     assert law.probability > 0.9

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from measured_wrist import wrong_wrist
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.identification.strained import strain
@@ -10,14 +11,11 @@ from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.model.effect import effect_at
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.unit_session import as_units
-from wrist_stiffness.simulation.cell import CellSettings
 
 
 @pytest.fixture(scope="module")
 def day(model, in_the_cell):
-    settings = CellSettings(
-        rate_hz=10.0, program_seconds=120.0, program_seed=41, base="wrong", base_seed=3
-    )
+    settings = wrong_wrist(120.0, 41, 3)
     return in_the_cell(model.table, settings, 5)
 
 
@@ -44,14 +42,13 @@ def test_a_wrist_within_its_tolerances_is_not_strained(model, day):
 @pytest.mark.parametrize("seed", [10, 20])
 def test_bores_that_are_tilted_where_they_are_are_within_their_tolerances(model, in_the_cell, seed):
     """A tilt at a bushing moves the axis at O; without that these have chances of 1 and 3 %."""
-    settings = CellSettings(
-        rate_hz=20.0, program_seconds=60.0, program_seed=seed, base="wrong", base_seed=seed
-    )
+    settings = wrong_wrist(60.0, seed, seed, rate_hz=20.0)
     found = strained(model, in_the_cell(model.table, settings, 1))
     assert found.sentence == ""
     assert found.chance > 0.1
 
 
+@pytest.mark.slow
 def test_parts_that_are_each_a_little_soft_are_too_much_together(model, day):
     """Each within two and a half standard deviations, which alarms nobody."""
     laws = [find_law(f"{kind}_stiffness") for kind in ("link", "bushing")]

@@ -101,6 +101,7 @@ def test_a_cut_between_the_indexes_of_a_chunk_loses_no_topic(
     assert len(list(recording.messages())) == 76
 
 
+@pytest.mark.slow
 def test_flipped_bytes_never_escape_as_another_error(tmp_path, small):
     _, whole = small
     generator = np.random.default_rng(4)

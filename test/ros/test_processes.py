@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from sensor_msgs.msg import JointState
+from waiting import wait_until
 
 from wrist_stiffness.cli import main as command_line
 from wrist_stiffness.commands import cell
@@ -283,10 +284,7 @@ def test_a_signal_ends_the_cell_with_all_its_nodes(tmp_path, ending, code):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
         try:
-            end_s = time.monotonic() + DEADLINE_S
-            while not list(tmp_path.glob(f".{path.name}.*")) and time.monotonic() < end_s:
-                assert process.poll() is None
-                os.sched_yield()
+            wait_until(lambda: list(tmp_path.glob(f".{path.name}.*")), process)
             children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
             process.send_signal(ending)
             _, errors = process.communicate(timeout=DEADLINE_S)
@@ -310,16 +308,14 @@ def is_running(pid):
 def test_a_killed_cell_leaves_no_node_behind_and_a_whole_recording(tmp_path):
     path = tmp_path / "killed.mcap"
     command = [sys.executable, "-m", "wrist_stiffness", "cell", "--record", str(path)]
-    end_s = time.monotonic() + DEADLINE_S
     with subprocess.Popen(command) as process:
         try:
-            while not list(tmp_path.glob(f".{path.name}.*")) and time.monotonic() < end_s:
-                assert process.poll() is None
-                os.sched_yield()
+            wait_until(lambda: list(tmp_path.glob(f".{path.name}.*")), process)
             children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
         finally:
             process.kill()
     assert len(children) == 5
+    end_s = time.monotonic() + DEADLINE_S
     while any(map(is_running, children)):
         assert time.monotonic() < end_s
         os.sched_yield()

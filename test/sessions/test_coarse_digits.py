@@ -93,6 +93,7 @@ def test_poses_that_repeat_exactly_can_be_judged(model, repeated):
     assert all(np.isfinite(each) and each > 0.0 for each in found.explained.error.values())
 
 
+@pytest.mark.slow
 def test_poses_that_repeat_exactly_can_be_fitted_to(model, repeated):
     found = calibrate(model, [repeated])
     assert all(np.isfinite(each.sigma) and each.sigma > 0.0 for each in found.parameters)

@@ -225,6 +225,7 @@ def test_readings_one_after_the_other_tell_the_same(tmp_path, model, table):
     assert np.nanstd(left[:, 0]) < 2.0 * NOISE[0]
 
 
+@pytest.mark.slow
 def test_a_soft_link_is_calibrated_with_gauges(tmp_path, model, table):
     soft = Effect(find_law("link_stiffness"), "link_1").with_values({"flexibility_percent": 60.0})
     block = conditions(200)

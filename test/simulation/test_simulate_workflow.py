@@ -2,11 +2,11 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from waiting import wait_until
 
 from wrist_stiffness import topics
 from wrist_stiffness.cli.main import main
@@ -98,11 +98,7 @@ def test_terminated_command_leaves_nothing_behind(name, wrist, tmp_path):
     arguments += ["--seconds", "3600", "--rate", "500"]
     process = subprocess.Popen([sys.executable, "-m", "wrist_stiffness", *arguments])
     try:
-        deadline = time.monotonic() + 60.0
-        while not list(folder.iterdir()) and time.monotonic() < deadline:
-            with pytest.raises(subprocess.TimeoutExpired):
-                process.wait(timeout=0.05)
-        assert list(folder.iterdir())
+        wait_until(lambda: list(folder.iterdir()), process)
         process.terminate()
         assert process.wait(timeout=60.0) == 128 + signal.SIGTERM
     finally:

@@ -14,9 +14,14 @@ NAMING = 0.9
 
 def opened(name, folder):
     """Return a bench with an example, and what the page shows once it was asked."""
-    bench = Bench(folder, lambda text: None, lambda done, total: None)
+    told = []
+    bench = Bench(folder, told.append, lambda done, total: None)
     bench.open_example(name)
-    return bench, bench.calibrate(), bench.rank()
+    calibrated = bench.calibrate()
+    told.clear()
+    found = bench.rank()
+    assert len(told) > 1
+    return bench, calibrated, found
 
 
 def held_out(changes):
