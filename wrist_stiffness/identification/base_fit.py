@@ -164,8 +164,8 @@ def fit_base(
     quickly : bool
         Whether the columns of the base's start serve to the end: nearly as far, far quicker.
     gradually : bool
-        Whether differences are wide first, and the base's columns are taken beside play too; else
-        as if no play were there, which is far quicker and leads nearly as far.
+        Whether it begins with few units over wide differences, and takes the base's columns beside
+        play too; else as if no play were there, which is far quicker and leads nearly as far.
     """
     free, held = base or free_base(model)
     added = {effect.name: effect for effect in extras}
@@ -184,9 +184,9 @@ def fit_base(
         firm = replace(alone, free=(*free, *more[:count]))
     z = _start(problem, start, added)
     near, known = _near(problem, start) if start is not None and same else (None, None)
+    few = _few(problem) if gradually else problem
     for width in WIDTHS if gradually else ():
-        found = _descended(problem, alone, problem, z, NEARLY, near, known, width=width)
-        z, near = found.z, found.columns
+        z = _led(few, z, width).z
     enough = NEARLY if quickly else ENOUGH
     return _descended(problem, alone, firm, z, enough, near, known, quickly)
 
