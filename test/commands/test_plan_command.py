@@ -118,6 +118,7 @@ def test_table_summary_picture_and_json_belong_together(folder, rows):
     summary = (folder / "next/summary.txt").read_text()
     assert "backlash@motor_1 if true, against drive_compliance@motor_1" in summary
     assert "thermal_softening@joint_3: needs temperature of" in summary
+    assert "Carry it out twice" in summary
     assert (folder / "next/plan.png").read_bytes().startswith(b"\x89PNG")
     loaded = [row for row in rows if row["load"] == "gripper"]
     assert loaded
@@ -126,14 +127,16 @@ def test_table_summary_picture_and_json_belong_together(folder, rows):
 
 
 def test_what_many_rivals_leave_open_is_a_line_for_each_truth():
-    rivals = {"creep@joint_1": 0.5, "backlash@motor_1": 0.25, "": 0.75}
+    rivals = {"creep@joint_1": 0.5, "backlash@motor_1": 0.25, "": 0.75, "gravity@link_3": 0.0}
     answers = tuple(Answer(Goal("inertia@platform", r), d, True) for r, d in rivals.items())
-    lines = plan_summary(Plan(None, (), answers[:2], {}, {})).splitlines()[-1:]
-    lines += plan_summary(Plan(None, (), answers[2:], {}, {})).splitlines()[-1:]
+    lines = []
+    for some in (answers[:2], answers[2:3], answers[3:]):
+        lines += plan_summary(Plan(None, (), some, {}, {})).splitlines()[-1:]
     assert lines == [
         "  inertia@platform if true, against backlash@motor_1 and 1 more: 0.2 standard deviations, "
         "right in 55 %",
         "  inertia@platform against nothing: 0.8 standard deviations",
+        "  inertia@platform if true, against gravity@link_3: not told apart",
     ]
 
 

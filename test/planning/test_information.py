@@ -15,6 +15,7 @@ from wrist_stiffness.planning.information import (
     MOTION_NOISE,
     Goal,
     Information,
+    Layout,
     MeasurementNoise,
     calibrated,
     carried_over,
@@ -149,6 +150,18 @@ def test_discrimination_is_the_distance_of_dense_least_squares(
     # Over several truths the bound on a wrong answer is averaged.
     wrong = np.exp(-0.125 * apart).mean()
     assert found == pytest.approx(np.sqrt(-8.0 * np.log(wrong)), rel=1e-5, abs=1e-4)
+
+
+def test_parameters_that_no_measurement_tells_cost_nothing():
+    white = np.random.default_rng(3).normal(size=(40, 3))
+    found = []
+    for silent in (0, 20):
+        columns = np.hstack([white[:, :1], np.zeros((40, silent)), white[:, 1:]])
+        own, rival, whole = np.arange(1 + silent), np.array([1 + silent]), np.array([2 + silent])
+        layout = Layout(np.zeros(0), {}, {"a": own, "b": rival}, {"a": whole})
+        found.append(discrimination(columns.T @ columns, layout, [Goal("a", "b")])[0])
+    assert found[0] > 1.0
+    assert found[1] == pytest.approx(found[0])
 
 
 def test_visits_add_up_and_rivals_without_data_are_equally_large(known):
