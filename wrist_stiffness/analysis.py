@@ -127,12 +127,15 @@ class View:
         Noise of one unit and drift of the instrument, RMS by the key of the quantity.
     span : (u, 2) float
         First and last moment of each unit [s].
+    noise_known : bool
+        Whether anything tells the noise; else it is at most so large.
     """
 
     left: Observations
     predicted: Array
     noise: Mapping[str, float]
     span: Array
+    noise_known: bool
 
     @property
     def measured(self) -> Array:
@@ -215,7 +218,8 @@ class Analysis:
             spans.append(session.span[session.measured])
         left = shown.table.with_values(self._left(fit.base))
         noise = fit.table.noise_and_drift(fit.evidence)
-        return View(left, np.concatenate(predicted), noise, np.concatenate(spans))
+        known = fit.table.background.noise_known
+        return View(left, np.concatenate(predicted), noise, np.concatenate(spans), known)
 
     def contents(self) -> tuple[Contents, ...]:
         """Return what each recording holds, the instrument registered by the model as given."""

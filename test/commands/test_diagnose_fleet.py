@@ -21,6 +21,7 @@ def diagnosed(verdict, *classes, mistake="", keys=("s_um", "phi_mdeg")):
         "before": {f"rms_{key}": 12.34 for key in keys},
         "after": {f"rms_{key}": 1.234 for key in keys},
         "noise": dict.fromkeys(keys, 1.1),
+        "noise_known": True,
         "set_up_mistake": mistake,
     }
 

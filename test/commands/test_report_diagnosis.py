@@ -151,6 +151,12 @@ def test_everything_of_a_finding_is_on_the_page(observations):
     assert re.search(r"log evidence against the model without it\W+td\W+td\W+\+123", page)
 
 
+def test_a_noise_that_nothing_tells_is_an_upper_bound(observations):
+    page = page_of(replace(RESULT, noise_known=False), observations)
+    assert "s from 7.5 to 1.3 µm (instrument noise at most 1.2)" in page
+    assert "instrument noise at most, without drift" in page
+
+
 def test_what_mountings_of_gauges_do_is_not_drawn(observations, monkeypatch):
     drawn = []
     monkeypatch.setattr(

@@ -7,6 +7,8 @@ import pytest
 from measured_wrist import wrong_wrist
 from scipy.stats import rankdata
 
+from wrist_stiffness.commands.compare import Compared
+from wrist_stiffness.commands.provenance import Provenance
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, worst_poses
 from wrist_stiffness.comparing.curve import CLASSES, classes_of
@@ -21,6 +23,8 @@ from wrist_stiffness.simulation.catalogue import HiddenEffect
 from wrist_stiffness.simulation.cell import CellSettings
 
 N = 400
+
+PROVENANCE = Provenance("wrist-stiffness compare", "2026-01-01", {}, {})
 
 
 def along(observations, component, values):
@@ -258,6 +262,25 @@ def compared(dwells, *sizes):
         found = table(dwells, lambda c, size=size: shift(2, 1e-6 * size * np.sin(3 * c["theta_1"])))
         models.append(ComparedModel(f"m{place}", found.observations, found, ()))
     return Comparison(("day",), tuple(models), {}, {})
+
+
+def test_a_noise_that_nothing_tells_is_an_upper_bound(dwells):
+    """What jumps with the conditions, as play does, counts as noise there."""
+    seen = dwells(
+        np.random.default_rng(15), lambda c: shift(2, 20e-6 * np.sign(np.sin(40.0 * c["theta_1"])))
+    )
+    told, untold = (
+        Comparison(("day",), (ComparedModel("m", each, by_hand(each), ()),), {}, {})
+        for each in (seen, replace(seen, covariance=None))
+    )
+    assert told.noise_known
+    assert not any("at most" in line for line in told.verdict)
+    assert not untold.noise_known
+    assert untold.noise["s_um"] > 5.0 * told.noise["s_um"]
+    assert f"at most {untold.noise['s_um']:.3g} um of s" in untold.verdict[-1]
+    assert not untold.as_values()["models"][0]["noise_known"]
+    names = [name for name, _ in Compared(untold, np.empty((0, 2)), (), (), PROVENANCE).levels()]
+    assert "instrument noise at most" in names
 
 
 @pytest.mark.slow

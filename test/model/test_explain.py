@@ -63,16 +63,48 @@ def test_a_softer_link_keeps_its_modelled_share(weightless, make):
 
 
 @pytest.mark.parametrize("number", [0, 1, 2, 4])
-def test_spread_is_what_one_sigma_moves(loaded, number):
+def test_spread_is_what_both_sides_of_a_parameter_move(loaded, number):
     """Against the whole model evaluated again, contact and the other effects included."""
     effect = loaded.effects[number]
+    (key, estimate) = next((k, e) for k, e in effect.estimates.items() if e.sigma > 0.0)
     parts = budget(loaded, Sample(0.0, POSE, LOAD))
-    (other,) = effect.varied
-    effects = [other if e is effect else e for e in loaded.effects]
-    moved = loaded.with_effects(*effects).predict(POSE, LOAD).twist - parts.twist
-    spread = parts.effects[number].spread[0]
-    assert np.linalg.norm(moved) > 0.0
-    assert np.allclose(spread, moved, rtol=1e-6, atol=1e-14)
+    square = np.zeros((6, 6))
+    for side in (-1.0, 1.0):
+        other = effect.with_values({key: estimate.value + side * np.sqrt(3.0) * estimate.sigma})
+        effects = [other if e is effect else e for e in loaded.effects]
+        moved = loaded.with_effects(*effects).predict(POSE, LOAD).twist - parts.twist
+        assert np.linalg.norm(moved) > 0.0
+        square += np.outer(moved, moved) / 6.0
+    spread = parts.effects[number].spread
+    assert np.allclose(spread.T @ spread, square, rtol=1e-6, atol=1e-20)
+
+
+def test_play_that_more_play_no_longer_moves_is_as_uncertain_as_drawn_ones(model, make):
+    """Here the turn of the platform grows up to a clearance of 5 um and stays."""
+    play = make.effect("joint_clearance@joint_3", clearance_um=(6.0, 2.0))
+    load = Load(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
+    found = model.with_effects(play).predict(POSE, load)
+    clearance = np.linspace(0.0, 14.0, 57)
+    models = (model.with_effects(play.with_values({"clearance_um": each})) for each in clearance)
+    turns = np.array([each.predict(POSE, load).twist[3:] for each in models])
+    axis = found.twist[3:] / found.phi
+    drawn = np.abs(np.random.default_rng(0).normal(6.0, 2.0, 20_000))
+    spread = np.interp(drawn, clearance, turns @ axis).std()
+    plain = model.table_covariance(found.configuration, found.twist)
+    stated = np.sqrt(axis @ (found.covariance - plain)[3:, 3:] @ axis)
+    assert stated == pytest.approx(spread, rel=0.1)
+
+
+def test_an_effect_at_its_bound_is_as_uncertain_as_elsewhere(weightless, make):
+    """A compliance cannot be negative: what is past the bound is mirrored, not lost."""
+    spreads = []
+    for value in (0.0, 400.0):
+        soft = make.effect("drive_compliance@motor_1", compliance_mdeg_per_Nm=(value, 100.0))
+        found = weightless.with_effects(soft).predict(POSE, LOAD)
+        plain = weightless.table_covariance(found.configuration, found.twist)
+        spreads.append(np.sqrt(np.trace((found.covariance - plain)[3:, 3:])))
+    assert spreads[0] == pytest.approx(spreads[1], rel=1e-6)
+    assert spreads[0] > 0.0
 
 
 def test_uncertain_parameters_widen_the_prediction(model, make):

@@ -414,7 +414,7 @@ def test_joint_uncertainty_counts_once_and_survives_writing(tmp_path):
     (tmp_path / "older.yaml").write_text(yaml.safe_dump(older))
     before = load_model(tmp_path / "older.yaml").joint
     assert np.allclose(before.platform, measured, rtol=1e-12)
-    assert [len(each.variations) for each in (plain, again)] == [2, 1]
+    assert [len(each.variations) for each in (plain, again)] == [4, 2]
     sample = Sample(0.0, np.radians([10.0, 5.0]), Load(np.zeros(6)))
     covariance = again.session().advance(sample).covariance
     certain = Effect(find_law("encoder_offset"), "motor_1", {"offset_mdeg": Estimate(3.0)})

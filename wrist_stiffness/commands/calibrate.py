@@ -95,6 +95,7 @@ def fit_values(
     return {
         "schema": 2,
         "noise": dict(fit.noise),
+        "noise_known": fit.table.background.noise_known,
         "discrepancy": dict(fit.discrepancy),
         "before": {f"rmse_{key}": value for key, value in before.items()},
         "after": {f"rmse_{key}": value for key, value in after.items()},

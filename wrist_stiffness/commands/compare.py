@@ -19,6 +19,7 @@ from wrist_stiffness.commands.read_sessions import (
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, WorstPose, worst_poses
 from wrist_stiffness.comparing.wiring import WORTH_ASKING
+from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent
@@ -49,7 +50,7 @@ class Compared:
                 (f"{of[each.name]}surely above noise and drift", each.explained.above)
                 for each in models
             ),
-            (f"{of[last.name]}instrument noise", found.noise),
+            (f"{of[last.name]}instrument noise{at_most(found.noise_known)}", found.noise),
             (f"{of[last.name]}drift of the instrument", last.explained.drift),
         ]
         if found.repeated_by_side:

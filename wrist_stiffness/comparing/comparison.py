@@ -109,6 +109,11 @@ class Comparison:
         return self.models[-1].explained.noise
 
     @property
+    def noise_known(self) -> bool:
+        """Whether anything tells that noise; else it is at most so large."""
+        return self.models[-1].explained.noise_known
+
+    @property
     def reachable(self) -> dict[str, float]:
         """What the laws of the conditions leave of the first model's error, on unseen stretches."""
         return self.models[0].explained.reachable
@@ -144,6 +149,12 @@ class Comparison:
         ]
         if len(self.models) > 1:
             lines += [self._fall(q) for q in self.quantities]
+        if not self.noise_known:
+            lines.append(
+                "Nothing states the noise of the instrument: it is at most "
+                f"{self._sizes(self.noise)}, as play and friction pass for noise here. Repeated "
+                "readings would tell it."
+            )
         if self.mistake:
             lines.append(self.mistake)
         return tuple(lines)
@@ -155,6 +166,8 @@ class Comparison:
         state = found.answer.state
         if not (state.discrepant.any() or state.misfit):
             sure = percent(found.answer.nothing)
+            if not found.noise_known:
+                return f"none of it depends on what was recorded ({sure} sure)"
             return f"noise and drift of the instrument, no more ({sure} sure)"
         return f"{self._sizes(found.above)} are surely above noise and drift of the instrument"
 
@@ -181,6 +194,7 @@ class Comparison:
             "verdict": list(self.verdict),
             "units": self.models[0].refitted.n_units,
             "instrument_noise": self.noise,
+            "noise_known": self.noise_known,
             "repeatability": {
                 "from_any_side": self.repeated,
                 "from_the_same_side": self.repeated_by_side,

@@ -121,6 +121,11 @@ class Explained:
         """What the instrument's noise makes of it."""
         return self.table.noise(self.answer.state)
 
+    @property
+    def noise_known(self) -> bool:
+        """Whether anything tells the noise; else it is at most so large."""
+        return self.table.background.noise_known
+
     @cached_property
     def drift(self) -> dict[str, float]:
         """What an instrument's usual drift makes of it."""

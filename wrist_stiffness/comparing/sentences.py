@@ -65,6 +65,7 @@ def as_values(found: Explained) -> dict[str, Any]:
     """Return what programs read, with units in the names."""
     return {
         "instrument_noise": found.noise,
+        "noise_known": found.noise_known,
         "instrument_drift": found.drift,
         "above_noise": found.above,
         "reachable": found.reachable,

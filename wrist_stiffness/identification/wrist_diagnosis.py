@@ -175,6 +175,7 @@ def diagnose_sessions(
         held_out_noise=judge.noise(state.evidence),
         unforeseen=unforeseen,
         contradicted=contradicted,
+        noise_known=table.background.noise_known,
     )
     # Tolerances that give way to an unknown law, or one not asked yet, say nothing of the drawing.
     asked = search.ended != TIME_OVER and (proposals is None or proposals.complete)

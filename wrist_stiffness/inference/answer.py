@@ -421,6 +421,8 @@ class Diagnosis:
         Error on these units, in times noise and drift, where what explains all others leaves much.
     contradicted : dict
         Likewise, what then a fit to all leaves there; empty where that explains them.
+    noise_known : bool
+        Whether the noise is stated or shown by readings that repeat; else it is at most so large.
     """
 
     verdict: Verdict
@@ -441,6 +443,7 @@ class Diagnosis:
     held_out_noise: Mapping[str, float] = field(default_factory=dict)
     unforeseen: Mapping[str, float] = field(default_factory=dict)
     contradicted: Mapping[str, float] = field(default_factory=dict)
+    noise_known: bool = True
 
     @property
     def noise_of_judge(self) -> Mapping[str, float]:
@@ -477,6 +480,7 @@ class Diagnosis:
             "contradicted": dict(self.contradicted),
             "noise": dict(self.noise),
             "held_out_noise": dict(self.held_out_noise),
+            "noise_known": self.noise_known,
             "discrepancy": dict(self.discrepancy),
             "before": {f"rms_{key}": value for key, value in self.before.items()},
             "after": {f"rms_{key}": value for key, value in self.after.items()},

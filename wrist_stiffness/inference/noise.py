@@ -30,6 +30,11 @@ RICH_SHARE = 0.3
 """The rich model may use up at most this share of the numbers."""
 
 
+def at_most(known: bool) -> str:
+    """Return what stands before the size of a noise: play and friction pass for an unknown one."""
+    return "" if known else " at most"
+
+
 def replicate_variance(
     values: Array, columns: Array, observations: Observations
 ) -> tuple[Array, float]:

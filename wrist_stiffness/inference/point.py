@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.inference.giving import Give
+from wrist_stiffness.inference.noise import UNKNOWN
 from wrist_stiffness.inference.possible import Possible
 
 Array = NDArray[np.float64]
@@ -60,6 +61,11 @@ class Background:
     whole: Background | None = None  # of which it is a part
     numbers: tuple[int, ...] = ()  # places of its groups there
     _parts: dict[tuple[int, ...], Background] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def noise_known(self) -> bool:
+        """Whether anything tells the noise; else all that nothing smooth explains counts as it."""
+        return self.noise_width < UNKNOWN
 
     def part(self, numbers: Iterable[int]) -> Background:
         """Return some of the groups, by their places; what is known of all serves them too."""

@@ -154,6 +154,7 @@ def diagnose(
         _not_excited(problem, search),
         scope="another session" if aside.any() else "a part of this session",
         ended=search.ended,
+        noise_known=reading.state.evidence.background.noise_known,
         predictor=Predictor(_sets(search, refused), candidates, nuisances),
         search=search,
         lost=tuple(np.flatnonzero(away).tolist()),

@@ -16,6 +16,7 @@ from wrist_stiffness.mechanism.contact import forces_of
 from wrist_stiffness.mechanism.energy import component_wrenches
 from wrist_stiffness.mechanism.vectors import block_diagonal
 from wrist_stiffness.model.block import Sample
+from wrist_stiffness.model.effect import spread_of
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.evaluation import evaluate, evaluate_beside
 from wrist_stiffness.model.law import Contribution
@@ -28,7 +29,7 @@ class Share:
 
     name: str  # component, or effect@component
     twist: Array  # (6,), at O in F [m, rad]
-    # (p, 6), what one standard uncertainty of each uncertain parameter moves the whole [m, rad]
+    # (v, 6), what its uncertain parameters move the whole, as `spread_of` weighs it [m, rad]
     spread: Array
 
 
@@ -85,8 +86,8 @@ def budget(model: ErrorModel, sample: Sample) -> Budget:
             twist = _felt(at, added, result.active)
         moved = [model.with_effects(*before, other, *after) for other in effect.varied]
         varied = evaluate_beside(moved, [None] * len(moved), result)
-        spread = [other.measured[0] - result.measured[0] for other in varied]
-        effects.append(Share(effect.name, twist, np.reshape(spread, (-1, 6))))
+        spread = spread_of(result.measured[0], [other.measured[0] for other in varied])
+        effects.append(Share(effect.name, twist, spread))
     elastic = [Share(name, twists[k], np.empty((0, 6))) for k, name in enumerate(ELASTIC)]
     total = twists.sum(axis=0) + sum((share.twist for share in effects), np.zeros(6))
     covariance = model.table_covariance(configuration, result.twist[0])

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.law import Law, Stage
 from wrist_stiffness.model.parameters import Estimate, Parameter, si_factor
+
+SIDES, SHARE = 3.0**0.5, 1.0 / 6.0
+"""How far a parameter is moved to both sides [standard uncertainties], and what each side counts:
+three-point Gauss-Hermite rule of the unscented transform (Julier and Uhlmann 1997), exact for what
+is linear in it."""
 
 
 @dataclass(frozen=True)
@@ -88,15 +94,18 @@ class Effect:
 
     @cached_property
     def varied(self) -> tuple[Effect, ...]:
-        """The effect with each uncertain parameter moved by its uncertainty, within the bounds."""
+        """The effect with each uncertain parameter moved up and down by `SIDES`, within the bounds.
+
+        What is past a bound is mirrored at it: a clearance of 0 +- 2 um is as large as 2 um.
+        """
         moved = []
         for parameter in self.parameters:
             key, estimate = parameter.key, self.estimates[parameter.key]
             if estimate.sigma > 0.0:
-                up = estimate.value + estimate.sigma <= parameter.upper
-                value = estimate.value + (estimate.sigma if up else -estimate.sigma)
-                value = max(value, parameter.lower)
-                moved.append(self.with_values({key: value}))
+                for side in (SIDES, -SIDES):
+                    value = estimate.value + side * estimate.sigma
+                    mirrored = 2.0 * parameter.within(value) - value
+                    moved.append(self.with_values({key: parameter.within(mirrored)}))
         return tuple(moved)
 
     def with_values(self, values: Mapping[str, float]) -> Effect:
@@ -111,6 +120,15 @@ class Effect:
         for key, value in values.items():
             changed[key] = Estimate(value, changed[key].sigma if key in changed else 0.0)
         return replace(self, estimates=changed)
+
+
+def spread_of(value: Array, varied: Sequence[Array]) -> Array:
+    """Return how far a value is uncertain, (v, k): s with the covariance s' s.
+
+    `value` (k,): as the effects have it; `varied`, (k,) each: the same with each of the v effects
+    of `Effect.varied`.
+    """
+    return SHARE**0.5 * (np.reshape(varied, (-1, len(value))) - value)
 
 
 def effect_at(law: Law, place: str, values: Mapping[str, float]) -> Effect:

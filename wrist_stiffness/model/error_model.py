@@ -24,7 +24,7 @@ from wrist_stiffness.mechanism.vectors import dot
 from wrist_stiffness.model.batch import Recent, predicted
 from wrist_stiffness.model.block import Block, Load, Sample
 from wrist_stiffness.model.contribution import Constants
-from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.effect import Effect, spread_of
 from wrist_stiffness.model.evaluation import constant_of, evaluate, home_of
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.lineage import Step
@@ -167,7 +167,7 @@ class ErrorModel:
 
     @cached_property
     def variations(self) -> tuple[ErrorModel, ...]:
-        """The model with each uncertain parameter moved by its standard uncertainty.
+        """The model with each uncertain parameter moved as `Effect.varied` moves it.
 
         Those of effects in `joint` are left out.
         """
@@ -288,10 +288,9 @@ class ErrorModel:
         `twist` (6,): predicted [m, rad]; `moved`, (6,) each: the same as each of `variations`
         predicts it [m, rad].  Translation first, in F.
         """
-        covariance = np.zeros((6, 6)) if self.joint is None else self.joint.covariance
-        for other in moved:
-            covariance += np.outer(other - twist, other - twist)
-        return covariance
+        spread = spread_of(twist, moved)
+        alone: Array = spread.T @ spread
+        return alone if self.joint is None else alone + self.joint.covariance
 
     def batch(self, block: Block) -> BlockPrediction:
         """Predict the pose error of a whole recording, in bounded memory.

@@ -24,8 +24,8 @@ LARGEST_TURN = 1.0
 class Session:
     """A model with the memory of a stream of samples.
 
-    Each uncertain parameter has a memory of its own, moved by one standard uncertainty: so the
-    covariance knows the history.  Models without uncertainties cost one evaluation a sample.
+    Each of the model's `variations` has a memory of its own: so the covariance knows the history.
+    Models without uncertainties cost one evaluation a sample.
     """
 
     def __init__(self, model: ErrorModel) -> None:
@@ -80,6 +80,9 @@ class Session:
         def varied() -> list[Evaluated]:
             return evaluate_beside(model.variations, others, result)
 
+        def of_parameters() -> Array:
+            return model.parameter_covariance(twist, [each.twist[0] for each in varied()])
+
         left, right = result.situation.sensor
         prediction = Prediction(
             twist,
@@ -87,7 +90,7 @@ class Session:
             result.active[0],
             model.table_covariance,
             (_only(left), _only(right)),
-            lambda: model.parameter_covariance(twist, [each.twist[0] for each in varied()]),
+            None if model.certain else of_parameters,
             warnings=result.warnings,
         )
         return prediction, lambda: [each.memory for each in (result, *varied())]

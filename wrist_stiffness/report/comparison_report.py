@@ -9,6 +9,7 @@ import numpy as np
 
 from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.sentences import sentences
+from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.report.absorbed import absorbed_table
 from wrist_stiffness.report.page import (
     Bullets,
@@ -51,6 +52,8 @@ HOW = (
     "the evidence of all sets of laws that hold it, against those without it.",
     "Surely above noise and drift is what these laws explain, not the root of the difference of "
     "the squares of error and noise.",
+    "The noise is as stated, or as readings that repeat tell it; else all that no smooth law "
+    "explains counts as noise, play and friction too, and 'at most' says so.",
     "A size is the part of the error that goes with a condition, beyond what the refit could take "
     "up; +- is one standard uncertainty, a band two.",
     "Laws of the conditions, unseen part: what these laws leave of stretches that were not used to "
@@ -123,7 +126,7 @@ def _bars(compared: Compared) -> Picture:
             [model.after[q.key].rms for model in found.models],
             [model.after[q.key].rms_uncertainty for model in found.models],
             {
-                "instrument noise": found.noise[q.key],
+                f"instrument noise{at_most(found.noise_known)}": found.noise[q.key],
                 "laws of the conditions": found.reachable[q.key],
             },
         )

@@ -11,6 +11,7 @@ from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent, sentences
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.inference.answer import NotExcited, Standing
+from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.inference.search import TIME_OVER
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.absorbed import absorbed_lines, absorbed_table
@@ -76,7 +77,7 @@ def report_of_diagnosis(found: Diagnosed) -> Page:
     if result.findings:
         falls = [
             f"{_name(key)} from {number(before)} to {number(result.after[key])} {_unit(key)} "
-            f"(instrument noise {number(result.noise_of_judge[key])})"
+            f"({_noise(result)} {number(result.noise_of_judge[key])})"
             for key, before in result.before.items()
         ]
         verdict.append(f"Adding it changes the held-out error of {' and '.join(falls)}, RMS.")
@@ -122,7 +123,7 @@ def _sections(
     rows = (
         ("calibrated model (held out)", result.before),
         *findings_in,
-        ("instrument noise, without drift", result.noise_of_judge),
+        (f"{_noise(result)}, without drift", result.noise_of_judge),
         ("left above noise and drift (all data)", result.discrepancy),
     )
     keys = {**result.noise, **result.before}
@@ -156,6 +157,10 @@ def _unseen_in_short(effects: Sequence[NotExcited]) -> str:
     return f"{names}. What to record for each: --report or --json."
 
 
+def _noise(result: Diagnosis) -> str:
+    return f"instrument noise{at_most(result.noise_known)}"
+
+
 def _name(key: str) -> str:
     return key.rpartition("_")[0]
 
@@ -185,7 +190,7 @@ def _fall(result: Diagnosis) -> Picture:
             ["before", "with the findings"],
             [before, result.after[key]],
             [0.0, 0.0],
-            {"instrument noise": result.noise_of_judge[key]},
+            {_noise(result): result.noise_of_judge[key]},
         )
         for key, before in result.before.items()
     ]

@@ -10,6 +10,7 @@ import numpy as np
 from wrist_stiffness.identification.held_out import ANOTHER_SESSION, THIS_SESSION
 from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.report.page import Table, plus_minus, title
 from wrist_stiffness.sessions.measured_session import MeasuredSession
@@ -106,9 +107,10 @@ def _judged_lines(
     rows: Mapping[str, Mapping[str, float]],
 ) -> list[str]:
     """Tell what a fit saw, its errors as a table, how they were judged, and how much is left."""
+    unknown = at_most(fit.table.background.noise_known)
     cells = [
         [name, *(f"{row[key]:.3f}" if key in row else "-" for key in fit.noise)]
-        for name, row in {**rows, "noise and drift alone": fit.noise}.items()
+        for name, row in {**rows, f"noise and drift alone{unknown}": fit.noise}.items()
     ]
     table = Table("", ["", *map(title, fit.noise)], cells)
     *_, after = rows.values()

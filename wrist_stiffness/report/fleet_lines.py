@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wrist_stiffness.comparing.wiring import LOOK_FIRST
+from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.report.page import Table, title
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ def compared_lines(rows: Rows) -> list[str]:
         found = []
         for key in POSE:
             size = model["after_registration"].get(key)
-            found += ["-", "-"] if size is None else [f"{size['rms']:.3g}", f"{noise[key]:.3g}"]
+            own = ["-", "-"] if size is None else [f"{size['rms']:.3g}", _noise(values, noise[key])]
+            found += own
         depends = model["depends_on"]
         return [*found, depends[0]["condition"] if depends else "nothing beyond chance"]
 
@@ -52,7 +54,7 @@ def diagnosed_lines(rows: Rows) -> list[str]:
         for key in POSE:
             before, after = (values[when].get(f"rms_{key}") for when in ("before", "after"))
             fall = "-" if before is None else f"{before:.3g} -> {after:.3g}"
-            found += [fall, "-" if before is None else f"{values['noise'][key]:.3g}"]
+            found += [fall, "-" if before is None else _noise(values, values["noise"][key])]
         return [*found, _missing(values)]
 
     def mistakes(values: Values) -> list[str]:
@@ -60,6 +62,10 @@ def diagnosed_lines(rows: Rows) -> list[str]:
 
     title = "held-out RMS, before and after what is missing is added, and instrument noise"
     return [title, *_table(rows, "missing", cells, "diagnosed"), *_below(rows, mistakes)]
+
+
+def _noise(values: Values, size: float) -> str:
+    return f"{at_most(values['noise_known'])} {size:.3g}".strip()
 
 
 def _table(rows: Rows, last: str, cells: Callable[[Values], list[str]], done: str) -> list[str]:

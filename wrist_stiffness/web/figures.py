@@ -213,8 +213,10 @@ def contrast(shown: Shown, condition: str, told: Curve | None) -> Figure:
     return figure
 
 
-def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Quantity) -> Figure:
-    """Return the held-out error of every version, with the noise as the line to reach."""
+def waterfall(
+    versions: Sequence[Row], noise: Mapping[str, float], called: str, quantity: Quantity
+) -> Figure:
+    """Return the held-out error of every version, with the noise, so called, as the goal."""
     sizes = [each.held_out.get(quantity.key, np.nan) for each in versions]
     # The first one stands wherever instrument and target were put: it says nothing of the wrist.
     top = 1.25 * max(sizes[1:] or sizes)
@@ -239,7 +241,7 @@ def waterfall(versions: Sequence[Row], noise: Mapping[str, float], quantity: Qua
     figure["layout"] |= {
         "showlegend": False,
         "shapes": [_upright(floor, {"color": FLOOR, "width": 2, "dash": "dash"})],
-        "annotations": [{**word, "text": f"goal: noise floor {number(floor)} {unit}"}],
+        "annotations": [{**word, "text": f"goal: {called} {number(floor)} {unit}"}],
     }
     figure["layout"]["xaxis"] |= {"range": [0.0, top]}
     figure["layout"]["yaxis"] |= {"autorange": "reversed", "automargin": True}

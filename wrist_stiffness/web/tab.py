@@ -17,6 +17,7 @@ from nicegui import background_tasks, run, ui
 from wrist_stiffness.analysis import View
 from wrist_stiffness.comparing.comparison import lengths
 from wrist_stiffness.inference.answer import Diagnosis
+from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.inference.observations import Mask, Observations, Quantity
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.model.model_file import load_model
@@ -227,3 +228,8 @@ class Tab:
     def noise(self) -> dict[str, float]:
         """Noise floor as the newest version tells it, by the key of the quantity."""
         return dict(self.views[max(self.views)].noise)
+
+    @property
+    def noise_floor(self) -> str:
+        """What it is called."""
+        return f"noise floor{at_most(self.views[max(self.views)].noise_known)}"

@@ -150,7 +150,8 @@ class Views:
                 with ui.column().classes("gap-0"):
                     ui.label(f"Held-out error of {spelled(quantity.name)}").classes("text-xs")
                     ui.label(f"{path} {unit}").classes("text-3xl font-bold whitespace-nowrap")
-                    ui.label(f"noise floor {number(tab.noise[key])} {unit}").classes("text-xs")
+                    floor = f"{tab.noise_floor} {number(tab.noise[key])} {unit}"
+                    ui.label(floor).classes("text-xs")
             with ui.column().classes("gap-0"):
                 units, chosen = shown.view.left.n_units, shown.chosen
                 every = f"all {units} poses"
@@ -167,7 +168,7 @@ class Views:
         if shown is None:
             return
         if tab.lower == VERSIONS:
-            _show(self._lower, waterfall(tab.rows, tab.noise, shown.quantity))
+            _show(self._lower, waterfall(tab.rows, tab.noise, tab.noise_floor, shown.quantity))
             return
         told = tab.told.curves.get(str(self._condition.value)) if tab.told else None
         name = str(self._condition.value) if told is None else told.names[0]

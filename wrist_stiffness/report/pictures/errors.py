@@ -12,6 +12,7 @@ from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, leng
 from wrist_stiffness.comparing.curve import CELL_DEG, Curve, classes_of, since_start_s
 from wrist_stiffness.comparing.explained import Told
 from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.report.page import title, typeset
 from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure
@@ -149,8 +150,8 @@ def draw_time_line(found: Comparison, models: Sequence[ComparedModel]) -> Any:
                     label=_shortened(model.name),
                     rasterized=True,
                 )
-            floor = found.noise[quantity.key]
-            plot.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise floor")
+            floor, noise = found.noise[quantity.key], f"noise floor{at_most(found.noise_known)}"
+            plot.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.0, label=noise)
             plot.set_ylim(bottom=0.0)
             plot.grid(alpha=0.3)
         row[0].set_ylabel(typeset(title(quantity.key)))
