@@ -120,6 +120,16 @@ def test_what_cannot_be_told_apart_shares_a_class(rng):
     assert finding.probability >= 0.95
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_of_two_effects_with_a_twin_each_both_are_named(seed):
+    twins = (replace(SQUARE, component="other part"), replace(SIGN, component="other part"))
+    units = planted(table(np.random.default_rng(seed)), (SQUARE, 50.0), (SIGN, -50.0))
+    result = diagnose(units, (*LAWS, *twins), (ZERO,))
+    found = {frozenset(each.names) for each in result.findings}
+    assert found == {frozenset((f"{n}@part", f"{n}@other part")) for n in ("play", "bow")}
+    assert all(each.probability > 0.95 for each in result.findings)
+
+
 @pytest.mark.parametrize("size", [3e3, 1e4, 1e6])
 def test_parameters_that_the_data_cannot_separate_share_what_they_do(rng, size):
     """One weight at one place: its moment is as much larger or smaller as its force."""

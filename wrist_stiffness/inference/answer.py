@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import permutations
 from typing import Any, Literal
 
 import numpy as np
@@ -215,11 +216,7 @@ def read(search: Search, naming: float = NAMING) -> Reading:
 
 def _class_of(search: Search, weights: Mapping[Names, float], best: State, name: str) -> Class:
     others = best.names - {name}
-    found = {
-        next(iter(names - others)): weight
-        for names, weight in weights.items()
-        if len(names) == len(best.names) and others < names
-    }
+    found = _in_place_of(name, weights, best.names)
     total = sum(found.values())
     members = {
         each: weight / total
@@ -234,6 +231,27 @@ def _class_of(search: Search, weights: Mapping[Names, float], best: State, name:
     itself = 1.0 - stands_in(rest)
     gain = best.evidence.log - without.evidence.log
     return Class(members, present * itself, itself, rest, left, gain)
+
+
+def _in_place_of(name: str, weights: Mapping[Names, float], best: Names) -> dict[str, float]:
+    """Return what stands in place of an effect of the best set, and how probable it is there.
+
+    Beside the others of that set; or beside what stands in place of these, which data that cannot
+    tell them apart allow as well.
+    """
+    least = MEMBER * weights[best]
+    alike = {n: w for n, w in weights.items() if len(n) == len(best) and w >= least}
+    swapped = {own: {own} for own in best}
+    for names in alike:
+        if len(best - names) == 1:
+            swapped[next(iter(best - names))] |= names - best
+    others, found = sorted(best - {name}), dict[str, float]()
+    for names, weight in alike.items():
+        for own in names.difference(others):
+            pairs = (zip(others, each, strict=True) for each in permutations(names - {own}))
+            if any(all(one in swapped[other] for other, one in each) for each in pairs):
+                found[own] = found.get(own, 0.0) + weight
+    return found
 
 
 def _depends_on(state: State) -> dict[str, float]:
