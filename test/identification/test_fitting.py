@@ -311,6 +311,9 @@ def test_what_makes_another_day_worse_is_not_handed_over(model):
     assert found.refused["s_um"] > 3.0 * found.after["s_um"]
     assert {each.law.id for each in found.model.effects} <= {law for law, _ in SET_UP}
     assert "the part that judges comes out worse" in found.warnings[0]
+    assert "or it is not the same wrist" in found.warnings[0]
+    quiet = replace(found, refused=found.fit.noise)
+    assert "Both are no more than noise" in quiet.warnings[0]
     assert Calibrated(found, tuple(days), "").as_values()["warnings"] == list(found.warnings)
     assert not calibrate(model, [days[1], replace(days[1], name="again")]).refused
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.held_out import HeldOut, bought, speak_for
+from wrist_stiffness.inference.held_out import HeldOut, bought, refuted, speak_for
 from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.inference.point import Background, Group, Point
 
@@ -71,3 +71,13 @@ def test_the_uncertainty_of_what_was_bought_is_that_of_chance_wherever_it_moves(
         off.append((fall - true * LENGTH.per_si**2 / level) / error)
     # Student's t of seven degrees of freedom has a spread of 1.18.
     assert 0.9 < np.std(off) < 1.5
+
+
+def test_a_change_of_next_to_nothing_is_refuted_by_nothing_that_wanders():
+    wander = 3.0 * np.sin(np.arange(N) / 5.0)
+    none = np.zeros((N, 0))
+    verdicts = [
+        refuted(HeldOut(none, wander), HeldOut(none, (1.0 + share) * wander))
+        for share in (1e-9, 1e-3, 0.5)
+    ]
+    assert verdicts == [False, False, True]

@@ -62,10 +62,15 @@ class Calibration:
             for q in self.fit.problem.table.reported
             if self.refused.get(q.key, 0.0) > self.after.get(q.key, 0.0)
         )
+        why = (
+            "An effect is missing ('wrist-stiffness diagnose' finds out which), or it is not the "
+            "same wrist."
+        )
+        if all(error <= self.fit.noise[key] for key, error in self.refused.items()):
+            why = "Both are no more than noise and drift: longer recordings would tell more."
         return (
             "only the set-up was fitted. With what these recordings say of the wrist, the part "
-            f"that judges comes out worse: {worse}. An effect is missing ('wrist-stiffness "
-            "diagnose' finds out which), or it is not the same wrist.",
+            f"that judges comes out worse: {worse}. {why}",
         )
 
     @cached_property

@@ -15,6 +15,7 @@ import numpy as np
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.observations import Array, Labels, Mask, Observations, Quantity
 from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.search import NEGLIGIBLE
 
 HELD_OUT = 0.2
 """Part of the units that judges where there is one session only (assumed)."""
@@ -135,8 +136,9 @@ def refuted(before: HeldOut, after: HeldOut) -> bool:
     """Whether an effect makes held-out units worse by more than chance explains.
 
     The change f of the prediction gains 2 r f - f^2; with a right f its standard deviation is
-    2 |f|, so a loss beyond twice that is none of a right effect.
+    2 |f|, so a loss beyond twice that is none of a right effect.  Where f is next to nothing, so is
+    a loss, and what wanders in r may pass that: of log odds that are negligible nothing is learned.
     """
     change = float(np.linalg.norm(before.white - after.white))
     gain = before.energy - after.energy
-    return gain < -4 * change
+    return gain < -max(4.0 * change, 2.0 * NEGLIGIBLE)
