@@ -313,7 +313,7 @@ def test_what_makes_another_day_worse_is_not_handed_over(model):
     assert "the part that judges comes out worse" in found.warnings[0]
     assert "or it is not the same wrist" in found.warnings[0]
     quiet = replace(found, refused=found.fit.noise)
-    assert "Both are no more than noise" in quiet.warnings[0]
+    assert "Both are about noise and drift" in quiet.warnings[0]
     assert Calibrated(found, tuple(days), "").as_values()["warnings"] == list(found.warnings)
     assert not calibrate(model, [days[1], replace(days[1], name="again")]).refused
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.base_fit import BaseFit, best_valley, fit_cleaned
 from wrist_stiffness.identification.free_effects import commissioning, unfitted
-from wrist_stiffness.identification.held_out import Judge
+from wrist_stiffness.identification.held_out import MUCH, Judge
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem, require_units
 from wrist_stiffness.identification.result import FittedParameter
@@ -66,8 +66,8 @@ class Calibration:
             "An effect is missing ('wrist-stiffness diagnose' finds out which), or it is not the "
             "same wrist."
         )
-        if all(error <= self.fit.noise[key] for key, error in self.refused.items()):
-            why = "Both are no more than noise and drift: longer recordings would tell more."
+        if all(error <= MUCH * self.fit.noise[key] for key, error in self.refused.items()):
+            why = "Both are about noise and drift: longer recordings would tell more."
         return (
             "only the set-up was fitted. With what these recordings say of the wrist, the part "
             f"that judges comes out worse: {worse}. {why}",

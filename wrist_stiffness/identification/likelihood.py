@@ -135,8 +135,15 @@ class WristTable(Whitened):
         return self.observations.rms(self.scatter(found))
 
     def noise_and_drift(self, found: Evidence) -> dict[str, float]:
-        """Return that with the instrument's slow drift, RMS by quantity."""
-        return self.observations.rms(self.scatter(found, drift=True))
+        """Return that with the instrument's slow drift as it went here, RMS by quantity.
+
+        What the set-up takes up of a drift is in no residual.
+        """
+        drift, ground = np.zeros(self.observations.values.shape), found.background
+        for number, (group, wrong) in enumerate(zip(ground.groups, found.discrepant, strict=True)):
+            if group.name == SLOW_DRIFT and not wrong:
+                drift += group.change(found.unnamed[ground.group == number])
+        return self.observations.rms(self.scatter(found) + drift**2)
 
     def scatter(self, found: Evidence, drift: bool = False) -> Array:
         """Return the variance of each unit by noise, and by slow drift, (u, m).

@@ -11,7 +11,7 @@ import numpy as np
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.base_fit import BaseFit, fit_base, fit_cleaned
 from wrist_stiffness.identification.candidates import compensable, turns_normal
-from wrist_stiffness.identification.held_out import ANOTHER_SESSION, Judge
+from wrist_stiffness.identification.held_out import ANOTHER_SESSION, MUCH, Judge
 from wrist_stiffness.identification.problem import require_units
 from wrist_stiffness.identification.proposal import Proposals
 from wrist_stiffness.identification.proposing import propose
@@ -45,11 +45,6 @@ from wrist_stiffness.sessions.refitted import TOLERATED
 from wrist_stiffness.sessions.unit_session import UnitSession, all_units
 
 Tell = Callable[[str], None]
-
-MUCH = 1.5
-"""Error of another session, in times noise and drift, that is neither: of one wrist a fit to both
-leaves up to 1.1, of two 1.7 and more where noise does not hide it
-(`pytest test/identification/test_diagnosing.py -k two_wrists`)."""
 
 
 def silent(text: str) -> None:
