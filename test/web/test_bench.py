@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.errors import InputError
+from wrist_stiffness.model.model_file import file_sha256, load_model
+from wrist_stiffness.web import bench as bench_module
 from wrist_stiffness.web.bench import Bench
 
 pytestmark = pytest.mark.slow
@@ -53,3 +55,29 @@ def test_what_was_opened_takes_no_commands(bench):
     effects, _, names = exported(bench, 0)
     assert "backlash@motor_2" not in effects
     assert names == ["yaml"]
+
+
+def test_an_export_that_fails_leaves_no_file(bench, monkeypatch):
+    folder, own = bench
+    before = sorted(folder.iterdir())
+
+    def full(path, page):
+        raise InputError(f"{path}: cannot be written: No space left on device")
+
+    monkeypatch.setattr(bench_module, "write_page", full)
+    with pytest.raises(InputError, match="No space left"):
+        own.export(EXTENDED)
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_recording_that_is_gone_since_is_exported_as_it_was_read(bench):
+    folder, own = bench
+    monday = folder / "monday.mcap"
+    sha, content = file_sha256(monday), monday.read_bytes()
+    monday.unlink()
+    try:
+        written = own.export(EXTENDED)["written"]
+    finally:
+        monday.write_bytes(content)
+    (report,) = (name for name, _ in written if name.endswith(".html"))
+    assert sha[:16] in (folder / report).read_text()

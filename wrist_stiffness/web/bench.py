@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import Analysis, Version
-from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.atomic_file import writing
 from wrist_stiffness.commands.diagnose import Diagnosed
 from wrist_stiffness.commands.extend import FormulaEffect, common_covariates
 from wrist_stiffness.commands.import_csv import import_csv
@@ -26,7 +26,7 @@ from wrist_stiffness.commands.provenance import Provenance
 from wrist_stiffness.commands.read_sessions import (
     Recordings,
     read_sessions,
-    recording_sha256,
+    sha256_by_name,
     was_fitted_to,
 )
 from wrist_stiffness.comparing.comparison import Comparison
@@ -121,6 +121,7 @@ class Bench:
         self._answers: dict[int, WristDiagnosis] = {}
         self._model, self._paths = Path(), [Path()]
         self._looked: tuple[str | Effect, str] = "", ""
+        self._hashes: tuple[dict[str, str], dict[str, str]] = {}, {}
         self._options: list[str] = []
 
     def open_example(self, name: str) -> Changes:
@@ -153,6 +154,8 @@ class Bench:
         told, again = (self._progress, self._tell), was_fitted_to(loaded, sessions)
         self._analysis = Analysis(loaded, list(sessions.values()), *told, again)
         self._answers, self._model, self._paths = {}, model, list(sessions)
+        # Of what was read: the files may be others, or gone, when a report names them.
+        self._hashes = {model.stem: file_sha256(model)}, sha256_by_name(sessions)
         self._options = []
         return {
             "covariates": tuple(common_covariates(sessions.values())),
@@ -260,22 +263,28 @@ class Bench:
     def export(self, number: int) -> Changes:
         """Write a version's model, the last diagnosis on the way to it and the same as commands."""
         self._tell("writing model, report and commands")
-        name = self._workspace.free("wrist")
-        files = {f"{name}.yaml": "model"}
-        save_model(self._opened.versions[number].model, self._workspace.path(f"{name}.yaml"))
+        name, written = self._workspace.free("wrist"), {}
+        parts: list[tuple[str, str, Callable[[Path], None]]] = [
+            ("yaml", "model", partial(save_model, self._opened.versions[number].model))
+        ]
         if lines := self._commands(number):
-            files[f"{name}.txt"] = "commands that do the same"
-            with replacing(self._workspace.path(f"{name}.txt")) as path:
-                path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+            parts.append(("txt", "commands that do the same", partial(_write_lines, lines)))
         if asked := [n for n in self._answers if n <= number]:
-            files[f"{name}.html"] = "report of the diagnosis"
-            hashes = {path.name: recording_sha256(path) for path in self._paths}
             date = datetime.now(UTC).isoformat(timespec="seconds")
-            parent = {self._model.stem: file_sha256(self._model)}
-            provenance = Provenance("wrist-stiffness workbench", date, parent, hashes)
-            answered = Diagnosed(self._answers[asked[-1]], tuple(hashes), "", (), provenance)
-            write_page(self._workspace.path(f"{name}.html"), report_of_diagnosis(answered))
-        return {"written": tuple(files.items())}
+            provenance = Provenance("wrist-stiffness workbench", date, *self._hashes)
+            told = tuple(provenance.recordings), "", (), provenance
+            page = report_of_diagnosis(Diagnosed(self._answers[asked[-1]], *told))
+            parts.append(("html", "report of the diagnosis", partial(write_page, page=page)))
+        try:
+            for ending, what, write in parts:
+                path = self._workspace.path(f"{name}.{ending}")
+                write(path)
+                written[path] = what
+        except BaseException:
+            for path in written:
+                path.unlink(missing_ok=True)
+            raise
+        return {"written": tuple((path.name, what) for path, what in written.items())}
 
     def _commands(self, number: int) -> list[str]:
         """Return what a terminal would do the same with, up to a version."""
@@ -312,6 +321,11 @@ class Bench:
             "diagnosis": None,
             "offers": (),
         }
+
+
+def _write_lines(lines: Sequence[str], path: Path) -> None:
+    with writing(path) as written:
+        written.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _row(version: Version) -> Row:
