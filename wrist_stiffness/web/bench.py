@@ -140,7 +140,7 @@ class Bench:
         return self._open(paths, self._workspace.model(model) if model else shipped_file(SHIPPED))
 
     def _recording(self, path: Path) -> Path:
-        if path.suffix != ".csv":
+        if path.suffix.lower() != ".csv":
             return path
         folder = self._workspace.folder / ".imported"
         folder.mkdir(exist_ok=True)
