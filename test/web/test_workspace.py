@@ -24,6 +24,15 @@ def test_a_name_that_leads_out_is_refused(workspace, name):
         workspace.save(name, b"")
 
 
+def test_names_that_browsers_make_are_taken_and_others_told_what_is(workspace):
+    workspace.save("bäd näme (1).mcap", b"")
+    assert workspace.recordings() == ["bäd näme (1).mcap"]
+    with pytest.raises(InputError, match=r"letters, digits, spaces and \. _ \+ - \( \), the first"):
+        workspace.save("monday[1].mcap", b"")
+    with pytest.raises(InputError, match="up to 100"):
+        workspace.save(f"{'m' * 96}.mcap", b"")
+
+
 def test_a_link_that_leads_out_is_refused(workspace, tmp_path):
     (tmp_path / "secret.yaml").write_text("key: 1\n")
     (workspace.folder / "model.yaml").symlink_to(tmp_path / "secret.yaml")

@@ -18,7 +18,8 @@ RECORDING, MODEL, TABLE = (".mcap", ".csv"), (".yaml", ".yml"), (".npz",)
 
 SHIPPED_TABLE = "precomputed/palmieri2015.npz"
 
-NAME = re.compile(r"[\w][\w .+-]{0,99}")
+NAME = re.compile(r"[\w][\w .+()-]{0,99}")
+"""Browsers add the parentheses, `monday (1).mcap`."""
 
 
 class Workspace:
@@ -35,7 +36,10 @@ class Workspace:
         """Return the path of a plain file name in the folder (InputError if it is none)."""
         path = self.folder / name
         if not NAME.fullmatch(name) or path.resolve().parent != self.folder:
-            raise InputError(f"{name!r} is no plain file name within the workspace")
+            raise InputError(
+                f"{name!r} is no plain file name within the workspace: up to 100 letters, digits, "
+                "spaces and . _ + - ( ), the first a letter, a digit or _"
+            )
         return path
 
     def model(self, name: str) -> Path:
