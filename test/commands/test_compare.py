@@ -143,18 +143,21 @@ def test_the_same_recording_gives_the_same_answer(compared, with_backlash, tmp_p
     assert again["models"] == values["models"]
 
 
-def test_a_model_fitted_to_the_recording_is_said_to_be(with_backlash, tmp_path, capsys):
+def test_to_which_of_the_recordings_a_model_was_fitted_is_said(with_backlash, tmp_path, capsys):
     from wrist_stiffness.commands.read_sessions import recording_sha256
 
-    sha = recording_sha256(DATA / "wrist_b.mcap")
+    days = [DATA / f"wrist_{each}.mcap" for each in "abc"]
+    shas = ", ".join(f"{each.stem}: '{recording_sha256(each)}'" for each in days[:2])
     lineage = (
         "lineage:\n  - {command: extend, date: '2026-01-01', "
-        f"parent_sha256: '{'0' * 64}', recordings: {{b: '{sha}'}}}}\n"
+        f"parent_sha256: '{'0' * 64}', recordings: {{{shas}}}}}\n"
     )
     model = tmp_path / "fitted.yaml"
     model.write_text(with_backlash.read_text() + lineage)
-    assert main(["compare", str(DATA / "wrist_b.mcap"), "--model", str(model)]) == 0
-    assert "fitted was fitted to one of these recordings" in capsys.readouterr().out
+    for recordings, fitted in ((days, "wrist_a.mcap, wrist_b.mcap"), (days[1:2], "wrist_b.mcap")):
+        assert main(["compare", *map(str, recordings), "--model", str(model)]) == 0
+        printed = " ".join(capsys.readouterr().out.split())
+        assert f"fitted was fitted to {fitted}: its error there flatters it" in printed
 
 
 def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong():

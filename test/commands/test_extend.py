@@ -226,7 +226,7 @@ def test_what_moved_in_the_base_is_told(model, extend_by):
         ),
         (
             FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * fzz", {}),
-            "fzz is neither a signal .* nor a covariate .*--start fzz=VALUE",
+            r"fzz is neither .* nor a .*\(fzz_um\), or in a terminal give --start fzz=VALUE",
         ),
         (FormulaEffect("f", "link_2", [0, 0, 0, 1, 0, 0], "a_mdeg * (", {}), "formula"),
         (
@@ -332,7 +332,9 @@ def test_an_axis_without_a_direction_is_refused(words):
     ],
 )
 def test_a_direction_that_is_none_is_one_line(words):
-    with pytest.raises(InputError, match="write six numbers .* 'along .*; several between ';'"):
+    with pytest.raises(
+        InputError, match="^direction .*: write six numbers .* 'along .*; several between ';'"
+    ):
         direction_of(words.split())
 
 

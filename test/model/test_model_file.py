@@ -147,6 +147,22 @@ def test_a_step_that_has_added_no_effect_is_one_line(tmp_path, name, why):
         load_model(path)
 
 
+@pytest.mark.parametrize("name", ["twist", "platform_compliance"])
+def test_a_law_that_no_file_holds_is_refused_also_by_a_name_of_the_catalogue(model, tmp_path, name):
+    script = {"__name__": "script"}
+    exec(OWN.replace('"twist"', f'"{name}"'), script)
+    path = tmp_path / "m.yaml"
+    effect = Effect(script["Twist"](), "platform", {"turn_mdeg": Estimate(3.0, 0.5)})
+    own = model.with_effects(*model.effects, effect)
+    with pytest.raises(InputError) as caught:
+        save_model(own, path)
+    assert str(caught.value) == (
+        f"{path}: {name}@platform cannot be saved: its class Twist has to come from a file, see "
+        "docs/python.md"
+    )
+    assert not path.exists()
+
+
 def test_saved_elsewhere_the_paths_still_lead_to_table_and_law(tmp_path):
     model = load_model(write(tmp_path))
     folder = tmp_path / "deep" / "er"

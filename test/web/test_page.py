@@ -152,6 +152,7 @@ def test_a_known_fault_and_then_one_that_nobody_knows(address, browser, pictures
     hand.panel("Missing")
     hand.page.get_by_text("An effect of your own, by formula").click()
     hand.page.wait_for_selector("text=It may use: clamp_bar")
+    assert "a name that ends in a unit (_um, _mdeg, _N ...) is a number to be found" in hand.text()
     hand.asks("What is missing?")
     assert "no effect in the catalogue explains it" in hand.text()
     hand.page.locator("button:has-text('Proposed'):has-text('clamp_bar')").first.click()

@@ -4,6 +4,7 @@ import pytest
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
+from wrist_stiffness.web.bench import Bench
 from wrist_stiffness.web.workspace import Workspace
 
 
@@ -21,6 +22,15 @@ def test_a_name_that_leads_out_is_refused(workspace, name):
         workspace.path(name)
     with pytest.raises(InputError, match="no plain file name"):
         workspace.save(name, b"")
+
+
+def test_names_that_browsers_make_are_taken_and_others_told_what_is(workspace):
+    workspace.save("bäd näme (1).mcap", b"")
+    assert workspace.recordings() == ["bäd näme (1).mcap"]
+    with pytest.raises(InputError, match=r"letters, digits, spaces and \. _ \+ - \( \), the first"):
+        workspace.save("monday[1].mcap", b"")
+    with pytest.raises(InputError, match="up to 100"):
+        workspace.save(f"{'m' * 96}.mcap", b"")
 
 
 def test_a_link_that_leads_out_is_refused(workspace, tmp_path):
@@ -65,3 +75,17 @@ def test_uploads_are_recordings_tables_and_models_only(workspace):
     (workspace.folder / "bag.mcap").mkdir()
     with pytest.raises(InputError, match="a folder of that name"):
         workspace.save("bag.mcap", b"")
+
+
+def test_what_was_uploaded_is_offered_however_large_its_letters(workspace):
+    for name in ("DAY.MCAP", "M.YAML", "T.CSV", "Y.Yml", "P.NPZ"):
+        workspace.save(name, b"")
+    assert workspace.recordings() == ["DAY.MCAP", "T.CSV"]
+    assert workspace.models() == ["M.YAML", "Y.Yml"]
+
+
+def test_a_table_in_capitals_is_imported(tmp_path):
+    bench = Bench(tmp_path, lambda words: None, lambda done, total: None)
+    (tmp_path / "T.CSV").write_text("no,column\n1,2\n")
+    with pytest.raises(InputError, match=r"T\.CSV: .*column"):
+        bench.open_named(["T.CSV"], "")

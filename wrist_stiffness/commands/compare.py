@@ -11,10 +11,10 @@ from typing import Any
 from wrist_stiffness.commands.provenance import Provenance, Run
 from wrist_stiffness.commands.read_sessions import (
     Recordings,
+    fitted_among,
     read_sessions,
     remarks_of,
     sha256_by_name,
-    was_fitted_to,
 )
 from wrist_stiffness.comparing.compare import compare_models
 from wrist_stiffness.comparing.comparison import ComparedModel, Comparison, WorstPose, worst_poses
@@ -89,9 +89,9 @@ def compare(
     notes = [
         *remarks_of(sessions.values()),
         *(
-            f"{name} was fitted to one of these recordings: its error here flatters it"
+            f"{name} was fitted to {', '.join(fitted)}: its error there flatters it"
             for name, model in loaded
-            if was_fitted_to(model, sessions)
+            if (fitted := fitted_among(model, sessions))
         ),
     ]
     if not loaded[-1][1].lineage and comparison.over_noise(comparison.models[-1]) >= WORTH_ASKING:

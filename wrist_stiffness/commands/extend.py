@@ -59,8 +59,8 @@ class FormulaEffect:
         if bare := [key for key in keys if key not in self.start and not has_unit(key)]:
             raise InputError(
                 f"{self.id}: {bare[0]} is neither a signal ({', '.join(sorted(SIGNALS))}) nor a "
-                "covariate of the recordings; if it is a parameter, end its name in its unit "
-                f"({bare[0]}_um), or give --start {bare[0]}=VALUE"
+                "covariate of the recordings; if it is a number to be found, end its name in its "
+                f"unit ({bare[0]}_um), or in a terminal give --start {bare[0]}=VALUE"
             )
         if not keys:
             raise InputError(
@@ -111,12 +111,12 @@ def _direction_of(text: str) -> list[float]:
     if kind in KINDS and len(three) == 3:
         length = math.hypot(*three)
         if not 0.0 < length < math.inf:
-            raise InputError(f"--direction {text}: an axis of length {length:g} has no direction")
+            raise InputError(f"direction {text}: an axis of length {length:g} has no direction")
         three = [number / length for number in three]
         return [*three, 0.0, 0.0, 0.0] if kind == "along" else [0.0, 0.0, 0.0, *three]
     if kind in KINDS or len(three) != 6:
         raise InputError(
-            f"--direction {text.strip() or '(nothing)'}: write six numbers (translation, rotation),"
+            f"direction {text.strip() or '(nothing)'}: write six numbers (translation, rotation),"
             " or as compare says 'along +z', 'about (-0.38, -0.88, 0.29)'; several between ';'"
         )
     return three

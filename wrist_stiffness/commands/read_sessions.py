@@ -130,15 +130,21 @@ def remarks_of(sessions: Iterable[MeasuredSession]) -> tuple[str, ...]:
 
 def was_fitted_to(model: ErrorModel, sessions: Mapping[Path, MeasuredSession]) -> bool:
     """Tell whether a model was fitted to one of these sessions, or to a copy or replay of one."""
+    return bool(fitted_among(model, sessions))
+
+
+def fitted_among(model: ErrorModel, sessions: Mapping[Path, MeasuredSession]) -> list[str]:
+    """Return the names of those sessions to which, or to a copy or replay, a model was fitted."""
     known = {
         sha256
         for step in model.lineage
         for sha256 in (*step.recordings.values(), *step.measured.values())
     }
-    return bool(known) and any(
-        measured_sha256(session) in known or recording_sha256(path) in known
+    return [
+        session.name
         for path, session in sessions.items()
-    )
+        if known and (measured_sha256(session) in known or recording_sha256(path) in known)
+    ]
 
 
 def measured_sha256(session: MeasuredSession) -> str:

@@ -34,7 +34,7 @@ from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.python_laws import require_python_laws
-from wrist_stiffness.model.registry import find_law, law_from_file
+from wrist_stiffness.model.registry import catalogue, find_law, law_from_file
 
 SCHEMA = 1
 FORMULA, PYTHON = "formula", "python"
@@ -161,7 +161,7 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If the model's table was never in a file, or the file cannot be written.
+        If the model's table or a user's own law was never in a file, or the file cannot be written.
     """
     path = Path(path)
     if model.table_file is None:
@@ -174,7 +174,7 @@ def save_model(model: ErrorModel, path: str | Path) -> None:
             "checksum": model.table.checksum,
         },
         "evaluation": model.evaluation,
-        "effects": [_entry(effect, path.parent) for effect in model.effects],
+        "effects": [_entry(effect, path) for effect in model.effects],
     }
     if model.joint is not None:
         content["joint_uncertainty"] = {
@@ -228,7 +228,7 @@ def _effect(node: Node, folder: Path) -> Effect:
         raise node.refuse(str(error)) from error
 
 
-def _entry(effect: Effect, folder: Path) -> dict[str, Any]:
+def _entry(effect: Effect, path: Path) -> dict[str, Any]:
     law = effect.law
     own: dict[str, Any] = {"effect": law.id, "component": effect.component}
     if isinstance(law, FormulaLaw):
@@ -238,8 +238,13 @@ def _entry(effect: Effect, folder: Path) -> dict[str, Any]:
         if law.covariates:
             own["covariates"] = list(law.covariates)
     elif law.file is not None:
-        reference = f"{_relative(law.file, folder)}:{type(law).__name__}"
+        reference = f"{_relative(law.file, path.parent)}:{type(law).__name__}"
         own = {"effect": PYTHON, "class": reference, "component": effect.component}
+    elif type(law) is not type(catalogue().get(law.id)):
+        raise InputError(
+            f"{path}: {effect.name} cannot be saved: its class {type(law).__name__} has to come "
+            "from a file, see docs/python.md"
+        )
     own["parameters"] = {
         key: [float(estimate.value), float(estimate.sigma)]
         for key, estimate in effect.estimates.items()

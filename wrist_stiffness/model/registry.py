@@ -158,8 +158,22 @@ def _require_parameters(law: Law, place: str) -> None:
 def law_from_file(reference: str, folder: Path) -> Law:
     """Return a user's own law from a Python file, which is executed.
 
-    `reference`: `FILE.py:CLASS`, relative to `folder`; `folder`: of the model file.  Gives `Law`:
-    an instance.  Raises `InputError` if the file cannot be run or has no such law.
+    Parameters
+    ----------
+    reference : str
+        `FILE.py:CLASS`, relative to the folder.
+    folder : path
+        Of the model file.
+
+    Returns
+    -------
+    Law
+        An instance.  A model with it can be saved: the model file names the Python file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be run or has no such law.
     """
     file, _, name = reference.rpartition(":")
     path = folder / file

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from wrist_stiffness.analysis import Analysis, Version
-from wrist_stiffness.atomic_file import replacing
+from wrist_stiffness.atomic_file import writing
 from wrist_stiffness.commands.diagnose import Diagnosed
 from wrist_stiffness.commands.extend import FormulaEffect, common_covariates
 from wrist_stiffness.commands.import_csv import import_csv
@@ -26,7 +26,7 @@ from wrist_stiffness.commands.provenance import Provenance
 from wrist_stiffness.commands.read_sessions import (
     Recordings,
     read_sessions,
-    recording_sha256,
+    sha256_by_name,
     was_fitted_to,
 )
 from wrist_stiffness.comparing.comparison import Comparison
@@ -118,9 +118,10 @@ class Bench:
         self._workspace = Workspace(folder)
         self._tell, self._progress = tell, progress
         self._analysis: Analysis | None = None
-        self._answer: WristDiagnosis | None = None
+        self._answers: dict[int, WristDiagnosis] = {}
         self._model, self._paths = Path(), [Path()]
         self._looked: tuple[str | Effect, str] = "", ""
+        self._hashes: tuple[dict[str, str], dict[str, str]] = {}, {}
         self._options: list[str] = []
 
     def open_example(self, name: str) -> Changes:
@@ -139,7 +140,7 @@ class Bench:
         return self._open(paths, self._workspace.model(model) if model else shipped_file(SHIPPED))
 
     def _recording(self, path: Path) -> Path:
-        if path.suffix != ".csv":
+        if path.suffix.lower() != ".csv":
             return path
         folder = self._workspace.folder / ".imported"
         folder.mkdir(exist_ok=True)
@@ -152,7 +153,9 @@ class Bench:
         self._tell("finding where the instrument stands")
         told, again = (self._progress, self._tell), was_fitted_to(loaded, sessions)
         self._analysis = Analysis(loaded, list(sessions.values()), *told, again)
-        self._answer, self._model, self._paths = None, model, list(sessions)
+        self._answers, self._model, self._paths = {}, model, list(sessions)
+        # Of what was read: the files may be others, or gone, when a report names them.
+        self._hashes = {model.stem: file_sha256(model)}, sha256_by_name(sessions)
         self._options = []
         return {
             "covariates": tuple(common_covariates(sessions.values())),
@@ -171,6 +174,11 @@ class Bench:
             raise InputError("open a recording first")
         return self._analysis
 
+    @property
+    def _answer(self) -> WristDiagnosis | None:
+        """The last answer to what is missing."""
+        return next(reversed(self._answers.values()), None)
+
     def calibrate(self) -> Changes:
         """Fit set-up and tolerances."""
         self._tell("fitting set-up and tolerances")
@@ -185,14 +193,15 @@ class Bench:
     def rank(self) -> Changes:
         """Ask what is missing."""
         self._tell("asking which effect is missing")
-        self._answer = self._opened.rank()
-        offers, found = [], self._answer.proposals
+        answer = self._opened.rank()
+        self._answers[len(self._opened.versions) - 1] = answer
+        offers, found = [], answer.proposals
         if found:
             # Only the first and those in its place exclude each other.
             offers += [("Proposed", law.as_values()) for law in found.terms[:1]]
             offers += [("Or in its place", law.as_values()) for law in found.rivals[:RIVALS]]
             offers += [("And once the first is added", law.as_values()) for law in found.terms[1:]]
-        return {"diagnosis": self._answer.diagnosis, "offers": tuple(offers), "seen": None}
+        return {"diagnosis": answer.diagnosis, "offers": tuple(offers), "seen": None}
 
     def look_at(self, candidate: str | FormulaEffect) -> Changes:
         """Find what a candidate would explain: `law@component`, or a formula."""
@@ -252,42 +261,51 @@ class Bench:
         return {"planned": (text, name)}
 
     def export(self, number: int) -> Changes:
-        """Write a version's model, the report of the last diagnosis and the same as commands."""
+        """Write a version's model, the last diagnosis on the way to it and the same as commands."""
         self._tell("writing model, report and commands")
-        name = self._workspace.free("wrist")
-        files = {f"{name}.yaml": "model", f"{name}.txt": "commands that do the same"}
-        model, commands = map(self._workspace.path, files)
-        save_model(self._opened.versions[number].model, model)
-        with replacing(commands) as path:
-            path.write_text("\n".join(self._commands()) + "\n", encoding="utf-8")
-        if self._answer is not None:
-            files[f"{name}.html"] = "report of the diagnosis"
-            hashes = {path.name: recording_sha256(path) for path in self._paths}
-            date = datetime.now(UTC).isoformat(timespec="seconds")
-            parent = {self._model.stem: file_sha256(self._model)}
-            provenance = Provenance("wrist-stiffness workbench", date, parent, hashes)
-            answered = Diagnosed(self._answer, tuple(hashes), "", (), provenance)
-            write_page(self._workspace.path(f"{name}.html"), report_of_diagnosis(answered))
-        return {"written": tuple(files.items())}
-
-    def _commands(self) -> list[str]:
-        """Return what a terminal would do the same with."""
-        days = shlex.join(str(path) for path in self._paths)
-        model = shlex.quote(str(self._model))
-        extensions = (
-            f"wrist-stiffness extend step_{n}.yaml {option} --fit {days} -o step_{n + 1}.yaml"
-            for n, option in enumerate(self._options, 1)
-        )
-        return [
-            f"wrist-stiffness calibrate {model} --fit {days} -o step_1.yaml",
-            f"wrist-stiffness diagnose {days} --model step_1.yaml",
-            *extensions,
+        name, written = self._workspace.free("wrist"), {}
+        parts: list[tuple[str, str, Callable[[Path], None]]] = [
+            ("yaml", "model", partial(save_model, self._opened.versions[number].model))
         ]
+        if lines := self._commands(number):
+            parts.append(("txt", "commands that do the same", partial(_write_lines, lines)))
+        if asked := [n for n in self._answers if n <= number]:
+            date = datetime.now(UTC).isoformat(timespec="seconds")
+            provenance = Provenance("wrist-stiffness workbench", date, *self._hashes)
+            told = tuple(provenance.recordings), "", (), provenance
+            page = report_of_diagnosis(Diagnosed(self._answers[asked[-1]], *told))
+            parts.append(("html", "report of the diagnosis", partial(write_page, page=page)))
+        try:
+            for ending, what, write in parts:
+                path = self._workspace.path(f"{name}.{ending}")
+                write(path)
+                written[path] = what
+        except BaseException:
+            for path in written:
+                path.unlink(missing_ok=True)
+            raise
+        return {"written": tuple((path.name, what) for path, what in written.items())}
+
+    def _commands(self, number: int) -> list[str]:
+        """Return what a terminal would do the same with, up to a version."""
+        days = shlex.join(str(path) for path in self._paths)
+        model, options, lines = shlex.quote(str(self._model)), iter(self._options), []
+        for n, version in enumerate(self._opened.versions[: number + 1]):
+            if n > 0:
+                how = f"calibrate {model}"
+                if version.added is not None:
+                    how = f"extend {model} {next(options)}"
+                model = f"step_{n}.yaml"
+                lines.append(f"wrist-stiffness {how} --fit {days} -o {model}")
+            if n in self._answers:
+                lines.append(f"wrist-stiffness diagnose {days} --model {model}")
+        return lines
 
     def undo(self) -> Changes:
         """Take the newest version back."""
         gone = self._opened.versions[-1]
         self._opened.undo()
+        self._answers.pop(len(self._opened.versions), None)
         if gone.added is not None:
             self._options.pop()
         return self._newest()
@@ -303,6 +321,11 @@ class Bench:
             "diagnosis": None,
             "offers": (),
         }
+
+
+def _write_lines(lines: Sequence[str], path: Path) -> None:
+    with writing(path) as written:
+        written.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _row(version: Version) -> Row:

@@ -225,7 +225,10 @@ class FormulaForm:
         try:
             if not str(self._formula.value or "").strip():
                 names = ", ".join([*self._tab.covariates, *sorted(SIGNALS)])
-                raise InputError(f"It may use: {names}; any other name is a number to be found")
+                raise InputError(
+                    f"It may use: {names}; a name that ends in a unit (_um, _mdeg, _N ...) is a "
+                    "number to be found"
+                )
             self._effect()
         except InputError as error:
             self._said.text, good = str(error), False

@@ -13,13 +13,13 @@ from wrist_stiffness.inputs.document import read_yaml
 from wrist_stiffness.sessions.reading.folder import is_recording
 from wrist_stiffness.shipped import shipped_file
 
-MODEL, TABLE = (".yaml", ".yml"), (".npz",)
-TAKEN = (".mcap", ".csv", *MODEL, *TABLE)
-"""What may be uploaded, by the end of the name."""
+RECORDING, MODEL, TABLE = (".mcap", ".csv"), (".yaml", ".yml"), (".npz",)
+"""Ends of names, in letters of any size."""
 
 SHIPPED_TABLE = "precomputed/palmieri2015.npz"
 
-NAME = re.compile(r"[\w][\w .+-]{0,99}")
+NAME = re.compile(r"[\w][\w .+()-]{0,99}")
+"""Browsers add the parentheses, `monday (1).mcap`."""
 
 
 class Workspace:
@@ -36,7 +36,10 @@ class Workspace:
         """Return the path of a plain file name in the folder (InputError if it is none)."""
         path = self.folder / name
         if not NAME.fullmatch(name) or path.resolve().parent != self.folder:
-            raise InputError(f"{name!r} is no plain file name within the workspace")
+            raise InputError(
+                f"{name!r} is no plain file name within the workspace: up to 100 letters, digits, "
+                "spaces and . _ + - ( ), the first a letter, a digit or _"
+            )
         return path
 
     def model(self, name: str) -> Path:
@@ -68,7 +71,7 @@ class Workspace:
     def save(self, name: str, content: bytes) -> Path:
         """Write an uploaded file in place of an older one (InputError if its name is refused)."""
         path = self.path(name)
-        if path.suffix.lower() not in TAKEN:
+        if path.suffix.lower() not in (*RECORDING, *MODEL, *TABLE):
             raise InputError(
                 f"{name}: the workbench takes recordings (.mcap), tables of poses (.csv), models "
                 "(.yaml) and their tables (.npz)"
@@ -81,13 +84,17 @@ class Workspace:
 
     def recordings(self) -> list[str]:
         """Return the names of recordings and tables of poses."""
-        return [p.name for p in self._files() if is_recording(p) or p.suffix == ".csv"]
+        return [p.name for p in self._files() if _ends(p, RECORDING) or is_recording(p)]
 
     def models(self) -> list[str]:
         """Return the names of model files."""
-        return [p.name for p in self._files() if p.suffix in MODEL]
+        return [p.name for p in self._files() if _ends(p, MODEL)]
 
     def _files(self) -> Sequence[Path]:
         return sorted(
             p for p in self.folder.iterdir() if NAME.fullmatch(p.name) and not p.is_symlink()
         )
+
+
+def _ends(path: Path, ends: Sequence[str]) -> bool:
+    return path.suffix.lower() in ends and not path.is_dir()
