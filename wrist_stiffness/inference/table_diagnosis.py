@@ -179,9 +179,9 @@ def _lost(observations: Observations, base: Array, candidates: Sequence[Candidat
     if observations.n_units < FEWEST_UNITS:
         return np.zeros(observations.n_units, dtype=bool)
     smooth = [each.features(observations.covariates) for each in questions(observations)]
-    columns = [base, in_each_component(smooth, observations)]
+    columns = [in_each_component(smooth, observations)]
     columns += [each.evaluate(observations, s) for each in candidates for s in each.shapes]
-    return lost_units(observations, np.concatenate(columns, axis=2), OUTLIER_LIMIT)
+    return lost_units(observations, base, np.concatenate(columns, axis=2), OUTLIER_LIMIT)
 
 
 def _spread(whole: Observations) -> Mask:
