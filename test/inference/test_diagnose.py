@@ -431,6 +431,9 @@ def test_a_saved_predictor_predicts_the_same(rng, tmp_path):
     np.testing.assert_array_equal(again.predict(unseen), result.predictor.predict(unseen))
     with pytest.raises(InputError, match="@part is not among the candidates"):
         load_predictor(tmp_path / "lever.json", (LINEAR,), (ZERO,))
+    for other in ((), (replace(ZERO, per_session=not ZERO.per_session),)):
+        with pytest.raises(InputError, match="zero, .* is not among the nuisances"):
+            load_predictor(tmp_path / "lever.json", LAWS, other)
     (tmp_path / "lever.json").write_text("[]")
     with pytest.raises(InputError, match="no saved predictor"):
         load_predictor(tmp_path / "lever.json", LAWS, (ZERO,))
