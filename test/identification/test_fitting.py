@@ -351,7 +351,7 @@ def test_half_a_correlation_is_not_told_together(model, correlation):
         covariance = np.array([[1.0, share], [share, 1.0]])
         return [
             each.together
-            for each in told_parameters(found.problem, found.z, covariance, np.ones(2))
+            for each in told_parameters(found.problem, found.z, covariance, np.ones(2), {})
         ]
 
     assert together(correlation) == [(), ()]

@@ -13,6 +13,7 @@ from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.formula_law import FormulaLaw
 from wrist_stiffness.model.parameters import Estimate
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.report.fit_lines import tolerances
 from wrist_stiffness.sessions.unit_session import as_units
 
 
@@ -28,6 +29,9 @@ def found_beside(problem, effect):
     """Return the parameters of a named effect beside that base, by key."""
     grown = problem.extended(problem.begin(), effect)
     return {p.key: p for p in grown.settled().parameters if p.effect == effect.name}
+
+
+WARM = Effect(find_law("thermal_expansion"), "link_1")
 
 
 def agrees(found, size):
@@ -75,6 +79,19 @@ def test_a_shape_is_found_from_its_grid(model):
     found = found_beside(base_of(model, hidden), Effect(hidden.law, "motor_1"))
     assert agrees(found["order"], 13.8)
     assert agrees(found["cos_mdeg"], 25.0)
+    for law in hidden.law.parameters("motor_1"):
+        own = found[law.key]
+        assert own.prior == pytest.approx(law.mean)
+        assert own.moved == pytest.approx((own.value - law.mean) / law.scale)
+
+
+def test_a_prior_is_that_of_the_law_wherever_its_fit_began(model):
+    """Where nothing warms a size stays at its mean, that of steel, and its text says from there."""
+    found = found_beside(base_of(model, WARM), WARM)
+    size = found["expansion_ppm_per_K"]
+    assert size.prior == 11.5
+    assert size.value == pytest.approx(11.5, abs=0.1)
+    assert tolerances(size) == "0.0 x the typical magnitude from 11.5"
 
 
 @pytest.mark.parametrize("typed", [1.0, -10.0])

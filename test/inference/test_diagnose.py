@@ -441,6 +441,9 @@ def test_a_saved_predictor_predicts_the_same(rng, tmp_path):
     np.testing.assert_array_equal(again.predict(unseen), result.predictor.predict(unseen))
     with pytest.raises(InputError, match="@part is not among the candidates"):
         load_predictor(tmp_path / "lever.json", (LINEAR,), (ZERO,))
+    for other in ((), (replace(ZERO, per_session=not ZERO.per_session),)):
+        with pytest.raises(InputError, match="zero, .* is not among the nuisances"):
+            load_predictor(tmp_path / "lever.json", LAWS, other)
     (tmp_path / "lever.json").write_text("[]")
     with pytest.raises(InputError, match="no saved predictor"):
         load_predictor(tmp_path / "lever.json", LAWS, (ZERO,))
@@ -484,11 +487,17 @@ def test_a_table_far_above_its_noise_gets_an_answer(rng, size):
     assert named(result) == {"cross@part"}
 
 
-def test_a_noise_of_nothing_is_refused_with_its_row(rng):
+@pytest.mark.parametrize("variance", [0.0, -1e-6])
+@pytest.mark.parametrize("row", [7, 77])
+def test_a_noise_of_nothing_or_less_is_refused_with_its_row(rng, variance, row):
+    """Also where a drift would make up for it, and where the row belongs to what judges."""
     covariance = np.tile(NOISE, (80, 1, 1))
-    covariance[7, 1, 1] = 0.0
-    with pytest.raises(InputError, match="covariance of row 7: a variance of 0, must be above 0"):
-        diagnose(planted(table(rng, covariance=covariance)), LAWS, (ZERO,))
+    covariance[row, 1, 1] = variance
+    units = planted(table(rng, covariance=covariance, session=np.repeat([0, 1], 40)))
+    units = replace(units, time_s=10.0 * np.arange(80))
+    message = f"covariance of row {row}: a variance of {variance:.3g}, must be above 0"
+    with pytest.raises(InputError, match=message):
+        diagnose(units, LAWS, (ZERO,))
 
 
 @pytest.mark.parametrize(

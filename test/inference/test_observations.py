@@ -33,6 +33,11 @@ def test_take_keeps_every_column_with_its_unit(rng):
         ({"covariates": {"x": np.zeros(3)}}, "covariate 'x' has shape"),
         ({"covariates": {"x": np.array([0, 1, np.nan, 2])}}, "not a number in row 2"),
         ({"covariance": np.eye(2)}, "covariance has shape"),
+        ({"covariance": np.full((1, 1), np.nan)}, "covariance is not a number"),
+        (
+            {"covariance": np.array([1.0, 1, np.inf, 1])[:, None, None]},
+            "covariance is not a number in row 2",
+        ),
         ({"time_s": np.array([0.0, 2, 1, 3])}, "runs backwards"),
     ],
 )

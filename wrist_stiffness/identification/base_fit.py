@@ -207,7 +207,8 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
         white = problem.whiten(found.residual).reshape(table.values.shape)
         beside = [smooth_columns(table), *([] if table.common is None else [table.common])]
         everything = np.concatenate([found.columns, *beside], axis=2)
-        lost = lost_units(table, everything, OUTLIER_LIMIT)
+        # What is left of the base after its fit is small: nothing of it must be in the model.
+        lost = lost_units(table, everything[:, :, :0], everything, OUTLIER_LIMIT)
         lost &= np.abs(white).max(axis=1) > OUTLIER_LIMIT
         if not lost.any():
             break

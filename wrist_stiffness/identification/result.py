@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from wrist_stiffness.identification.problem import NO_PRIOR, FitProblem
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.model.parameters import Parameter
 
 EXCITED = 0.7
 """A parameter is excited if its uncertainty falls below this share of its prior's."""
@@ -54,12 +56,17 @@ class FittedParameter:
 
 
 def told_parameters(
-    problem: FitProblem, z: Array, covariance: Array, prior: Array
+    problem: FitProblem,
+    z: Array,
+    covariance: Array,
+    prior: Array,
+    sized: Mapping[int, Parameter],
 ) -> tuple[FittedParameter, ...]:
     """Return all that was fitted, with uncertainties.
 
     `problem`: what was free; `z` (p,), `covariance` (p, p): steps from the means of the priors;
-    `prior` (p,): widths of the priors, in steps.
+    `prior` (p,): widths of the priors, in steps; `sized`: parameters with the prior of their law,
+    by the place of their unknown, whose mean and step only say where a fit began.
     """
     sigma = np.sqrt(np.diag(covariance))
     correlation = np.abs(covariance / np.outer(sigma, sigma)) - np.eye(len(sigma))
@@ -69,8 +76,12 @@ def told_parameters(
     for place, (unknown, steps) in enumerate(zip(problem.unknowns, z.tolist(), strict=True)):
         parameter = unknown.parameter
         value = fitted[unknown.session or 0][unknown.free].estimates[parameter.key].value
-        # A fit begins with a wider prior where an effect is large; that is no knowledge of it.
+        moved = steps * unknown.step
         usual = min(unknown.step, parameter.scale)
+        usual /= 1.0 if unknown.weight > NO_PRIOR else NO_PRIOR
+        if place in sized:
+            moved += unknown.mean - sized[place].mean
+            usual = sized[place].scale
         near = 1e-6 * unknown.step
         out.append(
             FittedParameter(
@@ -79,9 +90,9 @@ def told_parameters(
                 None if unknown.session is None else problem.sessions[unknown.session].name,
                 value,
                 float(sigma[place]) * unknown.step,
-                value - steps * unknown.step,
+                value - moved,
                 float(prior[place]) * unknown.step,
-                usual / (1.0 if unknown.weight > NO_PRIOR else NO_PRIOR),
+                usual,
                 min(value - parameter.lower, parameter.upper - value) < near,
                 tuple(names[i] for i in np.flatnonzero(correlation[place] > TOGETHER)),
             )

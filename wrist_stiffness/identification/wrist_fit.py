@@ -234,7 +234,7 @@ class WristFit:
     def parameters(self) -> tuple[FittedParameter, ...]:
         """All that was fitted, with uncertainties, where a fit has settled."""
         prior = self.ratio / np.sqrt(self.evidence.precision[: len(self.z)])
-        return told_parameters(self.problem, self.z, self.covariance, prior)
+        return told_parameters(self.problem, self.z, self.covariance, prior, self.sized)
 
     def effects(self, session: int = -1) -> tuple[Effect, ...]:
         """Return the free effects with estimates and uncertainties, as a session has them."""

@@ -7,7 +7,12 @@ import numpy as np
 from scipy.special import chdtr
 
 from wrist_stiffness.inference.observations import Array, Observations
-from wrist_stiffness.inference.projection import ABSORBED, leading_directions, orthonormal
+from wrist_stiffness.inference.projection import (
+    ABSORBED,
+    SQUARED_ROUNDING,
+    leading_directions,
+    orthonormal,
+)
 
 KNOWN, UNKNOWN = 0.2, 3.0
 """Standard deviation of the logarithm of the noise's variance where a table, an instrument or
@@ -171,17 +176,24 @@ def _shrunk(variance: Array, freedom: float, observations: Observations) -> Arra
     return found
 
 
-def rich_basis(base: Array, structure: Array, n_measured: int) -> Array:
+def rich_basis(
+    base: Array,
+    structure: Array,
+    n_measured: int,
+    share: float = RICH_SHARE,
+    least: float = SQUARED_ROUNDING,
+) -> Array:
     """Orthonormal basis of everything that could be structure, leading directions first.
 
     All of the base is in it: registrations and tolerances are far above the scatter, so that what
     a rough basis leaves of them would pass for it.
 
     `base` (N, p): weighted nuisance columns; `structure` (N, q): weighted columns of all
-    candidates; `n_measured`: measured numbers.
+    candidates; `n_measured`: measured numbers; `share`: of them, that directions use up at most;
+    `least`: as for `leading_directions`.
     """
     first = orthonormal(base)
     beyond = structure - first @ (first.T @ structure)
     seen = np.linalg.norm(beyond, axis=0) > ABSORBED * np.linalg.norm(structure, axis=0)
-    most = max(int(RICH_SHARE * n_measured) - first.shape[1], 0)
-    return np.hstack([first, leading_directions(beyond[:, seen], most)])
+    most = max(int(share * n_measured) - first.shape[1], 0)
+    return np.hstack([first, leading_directions(beyond[:, seen], most, least)])

@@ -117,6 +117,10 @@ class Observations:
             raise InputError(
                 f"covariance has shape {self.covariance.shape}, needs {(m, m)} or {(n, m, m)}"
             )
+        if self.covariance is not None and not np.isfinite(self.covariance).all():
+            row = np.argwhere(~np.isfinite(self.covariance))[0][0]
+            where = f" in row {row}" if self.covariance.ndim == 3 else ""
+            raise InputError(f"covariance is not a number{where}")
         if self.time_s is not None:
             same_session = np.diff(self.sessions) == 0
             if (np.diff(self.time_s)[same_session] < 0).any():

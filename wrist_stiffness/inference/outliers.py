@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from wrist_stiffness.inference.noise import rich_basis
 from wrist_stiffness.inference.observations import Array, Mask, Observations
-from wrist_stiffness.inference.projection import leading_directions
+from wrist_stiffness.inference.projection import SQUARED_ROUNDING
 
 FEWEST_UNITS = 12
 """From fewer units noise cannot be told from error, nor a lost beam from a good one (assumed)."""
@@ -36,12 +37,18 @@ def robust_scale(values: Array, least: Array | float = 0.0) -> Array:
 
     `values` (n, m): NaN = not measured; `least` (m,): it is at least that.
     """
-    scale = np.zeros(values.shape[1])
-    for component, column in enumerate(values.T):
-        good = column[np.isfinite(column)]
-        if good.size:
-            scale[component] = MAD_TO_SIGMA * np.median(np.abs(good - np.median(good)))
-    scale = np.maximum(scale, least)
+    return _typical_size(values - _medians(values), least)
+
+
+def _medians(values: Array) -> Array:
+    """Return the median of each component, (m,); 0 where nothing was measured."""
+    good = [column[np.isfinite(column)] for column in values.T]
+    return np.array([np.median(each) if each.size else 0.0 for each in good])
+
+
+def _typical_size(left: Array, least: Array | float) -> Array:
+    """Return the robust standard deviation about zero of each component, (m,), as above."""
+    scale = np.maximum(MAD_TO_SIGMA * _medians(np.abs(left)), least)
     return np.where(scale > 0.0, scale, 1.0)
 
 
@@ -60,33 +67,60 @@ def rounding(values: Array) -> Array:
     return found
 
 
-def lost_units(observations: Observations, columns: Array, limit: float) -> Mask:
+def lost_units(observations: Observations, base: Array, structure: Array, limit: float) -> Mask:
     """Return which units lie far from a model with everything in it, (n,).
 
     Iteratively reweighted least squares with Tukey's biweight on the distance of the whole unit,
-    so that one lost beam of a hundred does not pull the fit.
+    so that one lost beam of a hundred does not pull the fit.  Each number is compared with what the
+    fit leaves of noise there (Cook and Weisberg 1982): a fit comes near to the few rows that it
+    follows and stays away from those that it was not given.  The median of few numbers is too small
+    by chance: so in the end the root mean square of the units that are kept counts where it is
+    larger.
 
-    `observations`: table; `columns` (n, m, p): base and candidates; `limit`: robust standard
-    deviations beyond which a unit is lost.
+    `observations`: table; `base` (n, m, p): columns that may do far more than the scatter, all of
+    them are in the model; `structure` (n, m, q): columns of what else could be behind the values;
+    `limit`: robust standard deviations beyond which a unit is lost.
     """
     n, m = observations.values.shape
     measured = observations.measured
     values = np.where(measured, observations.values, 0.0)
     least = rounding(observations.values)
     size = robust_scale(observations.values, least)
-    rows = np.where(measured[:, :, None], columns / size[:, None], 0.0).reshape(n * m, -1)
-    basis = leading_directions(rows, int(MOST_DIRECTIONS * measured.sum()), LEAST)
+    base, structure = (
+        np.where(measured[:, :, None], each / size[:, None], 0.0).reshape(n * m, -1)
+        for each in (base, structure)
+    )
+    basis = rich_basis(base, structure, int(measured.sum()), MOST_DIRECTIONS, LEAST)
     target = (values / size).reshape(-1)
     weight = np.ones(n)
-    distance = np.zeros(n)
     for _ in range(ROUNDS):
         weighted = np.repeat(weight, m)[:, None] * basis
         gram = weighted.T @ basis + RIDGE * np.eye(basis.shape[1])
-        fit = basis @ np.linalg.solve(gram, weighted.T @ target)
-        residual = np.where(measured, (target - fit).reshape(n, m), np.nan)
-        scaled = np.where(measured, residual / robust_scale(residual, least / size), 0.0)
-        distance = np.sqrt(np.sum(scaled**2, axis=1) / np.maximum(measured.sum(axis=1), 1))
+        solved = np.asarray(np.linalg.solve(gram, weighted.T), dtype=np.float64)
+        share = _left_of_noise(basis, solved).reshape(n, m)
+        told = measured & (share > SQUARED_ROUNDING)
+        left = (target - basis @ (solved @ target)).reshape(n, m)
+        left = np.where(told, left / np.where(told, share, 1.0), np.nan)
+        scaled = left / _typical_size(left, least / size)
+        distance = np.sqrt(_mean_square(scaled, axis=1))
         before, weight = weight, np.clip(1 - (distance / limit) ** 2, 0, None) ** 2
         if np.abs(weight - before).max() < SETTLED:
             break
-    return distance > limit
+    larger = np.maximum(_mean_square(scaled[distance <= limit], axis=0), 1.0)
+    return np.asarray(_mean_square(scaled / np.sqrt(larger), axis=1) > limit**2)
+
+
+def _left_of_noise(basis: Array, solved: Array) -> Array:
+    """Return the standard deviation that a fit leaves of unit noise in each number, (N,).
+
+    `basis` (N, r), `solved` (r, N): the fit is their product times the numbers.
+    """
+    own = np.sum(basis * solved.T, axis=1)
+    of_all = np.sum((basis @ (solved @ solved.T)) * basis, axis=1)
+    return np.sqrt(np.maximum(1.0 - 2.0 * own + of_all, 0.0))
+
+
+def _mean_square(values: Array, axis: int) -> Array:
+    """Return the mean square of those that are numbers; 0 without any."""
+    count = np.isfinite(values).sum(axis=axis)
+    return np.asarray(np.nansum(values**2, axis=axis) / np.maximum(count, 1))

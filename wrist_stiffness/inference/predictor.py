@@ -61,7 +61,8 @@ class Predictor:
     def predict(self, units: Observations) -> Array:
         """Return what to add to the model's predictions, (n, m).
 
-        The registration of a session that was not in the data is 0: set it up first.
+        The registration of a session that was not fitted, as that which judged, is 0: set it up
+        first.
 
         Parameters
         ----------
@@ -113,7 +114,8 @@ def load_predictor(
     Raises
     ------
     InputError
-        If the file is none of these, or names a law that is not among the candidates.
+        If the file is none of these, or holds values of a law that is not among the candidates or
+        of a nuisance that is not among those given.
     """
     try:
         content: Any = json.loads(Path(path).read_text())
@@ -138,6 +140,10 @@ def load_predictor(
     unknown = named - {c.name for c in candidates}
     if unknown:
         raise InputError(f"{path}: {sorted(unknown)[0]} is not among the candidates")
+    refitted = {(key[0], key[1] is not None) for each in sets for key in each.nuisances}
+    for name, anew in sorted(refitted - {(each.name, each.per_session) for each in nuisances}):
+        how = "set up anew in every session" if anew else "the same in all sessions"
+        raise InputError(f"{path}: {name}, {how}, is not among the nuisances")
     return Predictor(sets, candidates, nuisances)
 
 

@@ -30,6 +30,7 @@ from wrist_stiffness.inference.outliers import FEWEST_UNITS, OUTLIER_LIMIT, lost
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.predictor import LEAST, PredictedSet, Predictor, predicted_set
 from wrist_stiffness.inference.search import NEGLIGIBLE, Search, State
+from wrist_stiffness.inference.shared import component_factors, own_covariance
 from wrist_stiffness.inference.smooth import questions
 
 HELD_OUT = 5
@@ -110,7 +111,7 @@ def diagnose(
     ------
     InputError
         If nothing was measured, `naming` is no probability, two candidates or nuisances have one
-        name, or columns are unusable.
+        name, columns are unusable, or a variance is not above 0.
     """
     if not 0.0 < naming < 1.0:
         raise InputError(f"naming must be a probability between 0 and 1, not {naming:g}")
@@ -172,6 +173,9 @@ def _refuse(
         raise InputError("nothing was measured: every value is NaN")
     if observations.n_units < 2:
         raise InputError("a table of one row: at least two are needed, one of them judges")
+    if observations.covariance is not None:
+        own = own_covariance(observations, observations.covariance)
+        component_factors(own, observations.measured)
 
 
 def _lost(observations: Observations, base: Array, candidates: Sequence[Candidate]) -> Mask:
@@ -179,9 +183,9 @@ def _lost(observations: Observations, base: Array, candidates: Sequence[Candidat
     if observations.n_units < FEWEST_UNITS:
         return np.zeros(observations.n_units, dtype=bool)
     smooth = [each.features(observations.covariates) for each in questions(observations)]
-    columns = [base, in_each_component(smooth, observations)]
+    columns = [in_each_component(smooth, observations)]
     columns += [each.evaluate(observations, s) for each in candidates for s in each.shapes]
-    return lost_units(observations, np.concatenate(columns, axis=2), OUTLIER_LIMIT)
+    return lost_units(observations, base, np.concatenate(columns, axis=2), OUTLIER_LIMIT)
 
 
 def _spread(whole: Observations) -> Mask:
