@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.inference import Observations
+from wrist_stiffness.inference import Candidate, Observations, Quantity
 
 
 def test_take_keeps_every_column_with_its_unit(rng):
@@ -33,6 +33,13 @@ def test_take_keeps_every_column_with_its_unit(rng):
         ({"covariates": {"x": np.zeros(3)}}, "covariate 'x' has shape"),
         ({"covariates": {"x": np.array([0, 1, np.nan, 2])}}, "not a number in row 2"),
         ({"covariance": np.eye(2)}, "covariance has shape"),
+        ({"values": [[0.0], [1.0]]}, "values must be a NumPy array of numbers"),
+        ({"covariates": {"x": [0, 1, 2, 3]}}, "covariate 'x' must be a NumPy array of numbers"),
+        ({"session": np.array(list("aabb"))}, "session must be a NumPy array of numbers"),
+        (
+            {"quantities": (Quantity("tip", "um", (0, 5)),)},
+            "quantity 'tip' names component 5, there are 0 to 0",
+        ),
         ({"covariance": np.full((1, 1), np.nan)}, "covariance is not a number"),
         (
             {"covariance": np.array([1.0, 1, np.inf, 1])[:, None, None]},
@@ -63,3 +70,8 @@ def test_units_know_their_row_through_several_choices(table):
     some = table.take(np.arange(10, 40)).take(np.array([5, 2]))
     assert some.rows.tolist() == [15, 12]
     assert some.with_values(some.values).rows.tolist() == [15, 12]
+
+
+def test_a_law_without_a_parameter_is_refused():
+    with pytest.raises(InputError, match="bend@arm has no parameter, it needs one for each column"):
+        Candidate("bend", "arm", (), lambda units, shape: np.zeros((units.n_units, 1, 0)))

@@ -101,6 +101,11 @@ class Candidate:
     compensable: str = "yes"
     inexactness: float = 0.05
 
+    def __post_init__(self) -> None:
+        """Refuse a law without a column."""
+        if not self.parameters:
+            raise InputError(f"{self.name} has no parameter, it needs one for each column")
+
     @property
     def name(self) -> str:
         """Effect and place as one word, ``effect@component``."""

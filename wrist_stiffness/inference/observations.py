@@ -21,6 +21,9 @@ Mask = NDArray[np.bool_]
 LABELS = ("time_s", "session", "replicate", "samples", "stand")
 """Columns (n,) of a table, where it has them, beside its conditions."""
 
+NUMBERS = "biuf"
+"""Kinds of NumPy types that are numbers, or yes and no."""
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -100,13 +103,17 @@ class Observations:
 
     def __post_init__(self) -> None:
         """Refuse tables whose columns do not belong together."""
+        per_unit = {name: getattr(self, name) for name in (*LABELS, "row")}
+        per_unit |= {f"covariate {name!r}": column for name, column in self.covariates.items()}
+        whole = {"values": self.values, "covariance": self.covariance}
+        for name, column in (whole | per_unit).items():
+            if column is not None and getattr(column, "dtype", np.dtype(str)).kind not in NUMBERS:
+                raise InputError(f"{name} must be a NumPy array of numbers")
         if self.values.ndim != 2 or self.values.size == 0:
             raise InputError(f"values must be (units, components), not {self.values.shape}")
         n, m = self.values.shape
         if np.isinf(self.values).any():
             raise InputError("values contain an infinite number; write NaN for 'not measured'")
-        per_unit = {name: getattr(self, name) for name in (*LABELS, "row")}
-        per_unit |= {f"covariate {name!r}": column for name, column in self.covariates.items()}
         for name, column in per_unit.items():
             if column is not None and column.shape != (n,):
                 raise InputError(f"{name} has shape {column.shape}, but there are {n} units")
@@ -127,6 +134,11 @@ class Observations:
                 raise InputError("time_s runs backwards inside a session; sort the rows by time")
         if not self.quantities:
             object.__setattr__(self, "quantities", (Quantity("value", "si", tuple(range(m))),))
+        for each in self.quantities:
+            if missing := set(each.components) - set(range(m)):
+                raise InputError(
+                    f"quantity {each.name!r} names component {min(missing)}, there are 0 to {m - 1}"
+                )
 
     @property
     def rows(self) -> Labels:
