@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.registry import effect_named
-from wrist_stiffness.planning.aims import after_data, as_asked
+from wrist_stiffness.planning.aims import Aims, Truths, after_data, as_asked
 from wrist_stiffness.planning.information import (
     FREE,
     MOTION_NOISE,
@@ -162,6 +162,25 @@ def test_parameters_that_no_measurement_tells_cost_nothing():
         found.append(discrimination(columns.T @ columns, layout, [Goal("a", "b")])[0])
     assert found[0] > 1.0
     assert found[1] == pytest.approx(found[0])
+
+
+def test_a_plan_between_rivals_does_not_wait_for_what_hardly_shows():
+    one, other, hardly = np.eye(30)[:3] * [[20.0], [20.0], [2.0]]
+    columns = np.stack([one, other, hardly, one, other, hardly], axis=1)
+    places = {name: np.array([at]) for at, name in enumerate("abc")}
+    truths = {name: np.array([3 + at]) for at, name in enumerate("abc")}
+    layout = Layout(np.zeros(0), {}, places, truths)
+    gram = columns.T @ columns
+    pool = Information(gram[None], layout)
+
+    def own(*goals):
+        return Aims(Truths(np.eye(6), layout), pool, np.zeros((6, 6)), goals, everything=False)
+
+    rivals, seen = (Goal("a", "b"), Goal("b", "a")), Goal("c", "")
+    assert own(*rivals, seen).reachable == (*rivals, seen)
+    assert own(*rivals, seen).settled(gram)
+    assert not own(seen).settled(gram)
+    assert not own(*rivals, seen).settled(gram / 100.0)
 
 
 def test_visits_add_up_and_rivals_without_data_are_equally_large(known):

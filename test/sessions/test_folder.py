@@ -9,7 +9,7 @@ from wrist_stiffness.sessions.reading.folder import recordings_in
 @pytest.fixture
 def campaign(tmp_path):
     """Two bare files, a rosbag2 folder, one that a killed recorder left, and what is none."""
-    for name in ("b.mcap", "a.mcap", "notes.txt"):
+    for name in ("b.mcap", "a.MCAP", "notes.txt"):
         (tmp_path / name).touch()
     for folder, file in (("day_2", "metadata.yaml"), ("day_1", "day_1_0.mcap"), ("cad", "x.step")):
         (tmp_path / folder).mkdir()
@@ -19,21 +19,21 @@ def campaign(tmp_path):
 
 def test_a_folder_stands_for_the_recordings_in_it_by_name(campaign):
     assert [path.name for path in recordings_in([campaign])] == [
-        "a.mcap",
+        "a.MCAP",
         "b.mcap",
         "day_1",
         "day_2",
     ]
 
 
-@pytest.mark.parametrize("name", ["day_1", "day_2", "a.mcap"])
+@pytest.mark.parametrize("name", ["day_1", "day_2", "a.MCAP"])
 def test_a_recording_stands_for_itself(campaign, name):
     assert list(recordings_in([campaign / name])) == [campaign / name]
 
 
 def test_none_is_named_twice_and_that_it_was_given_twice_is_known(campaign):
     found = recordings_in([campaign / "b.mcap", campaign])
-    assert [path.name for path in found] == ["b.mcap", "a.mcap", "day_1", "day_2"]
+    assert [path.name for path in found] == ["b.mcap", "a.MCAP", "day_1", "day_2"]
     assert list(found.values()) == [2, 1, 1, 1]
 
 

@@ -85,11 +85,15 @@ class Aims:
         return right + calibrated(gram, self.pool.layout) if self.everything else right
 
     def settled(self, gram: Array) -> bool:
-        """Tell whether nothing more is needed than a Gram matrix (q, q), `start` in it."""
-        found = by_truth(gram, self.pool.layout, self.reachable, self.start)
+        """Tell whether nothing more is needed than a Gram matrix (q, q), `start` in it.
+
+        What was not excited before is worth a setting, but no hour of them beside rivals that are
+        told apart.
+        """
+        asked = [each for each in self.reachable if each.rival] or self.reachable
+        found = by_truth(gram, self.pool.layout, asked, self.start)
         return all(
-            np.mean(d >= needed(goal)) >= LIKELY
-            for goal, d in zip(self.reachable, found, strict=True)
+            np.mean(d >= needed(goal)) >= LIKELY for goal, d in zip(asked, found, strict=True)
         )
 
     def answers(self, gram: Array) -> tuple[Answer, ...]:

@@ -21,7 +21,7 @@ def is_recording(path: Path) -> bool:
     a number.
     """
     if not path.is_dir():
-        return path.suffix == STORAGE
+        return path.suffix.lower() == STORAGE
     if (path / METADATA_FILE).is_file():
         return True
     storage = list(path.glob(f"*{STORAGE}"))
