@@ -277,11 +277,9 @@ class _Search:
         bare = replace(bare, left=bare.left + self._table.whiten(change))
         here = replace(first.state, point=bare)
 
-        best = law, 0.0
-        if law.form.spans:
-            beyond = Beyond(here, self.library.white, parts[None])
-            best = self.library.refined(law, partial(beyond.gain, 0, range(len(parts))))
-        refined = self._judged(*best, parts, bare, first.state)
+        beyond = Beyond(here, self.library.white, parts[None])
+        gain = partial(beyond.gain, 0, range(len(parts)))
+        refined = self._judged(*self.library.refined(law, gain), parts, bare, first.state)
         return max(first, refined, key=_log)
 
     def _judged(
