@@ -52,8 +52,13 @@ def claims(lines: Sequence[Line]) -> tuple[Array, NDArray[np.bool_]]:
 
 def verdicts(lines: Sequence[Line]) -> tuple[Array, NDArray[np.bool_]]:
     """Return the probability of every verdict, and whether it is right."""
-    told = [(line["probability"], line["verdict"] == expected(line)) for line in lines]
+    told = [(line["probability"], said(line) == expected(line)) for line in lines]
     return np.array([p for p, _ in told]), np.array([ok for _, ok in told], dtype=bool)
+
+
+def said(line: Line) -> str:
+    """Return the verdict whose probability is told: where nothing is decided, that of `none`."""
+    return "none" if line["verdict"] == "undecided" else line["verdict"]
 
 
 def expected(line: Line) -> str:
@@ -102,7 +107,7 @@ def rows(
         (
             "the same, dense tracker of unstated noise: not *none*",
             group("nothing_dense"),
-            lambda x: x["verdict"] != "none",
+            lambda x: said(x) != "none",
         ),
         ("one effect: right in the class", single, in_class),
         ("one effect: a false class", single, lambda x: spurious(x) > 0),

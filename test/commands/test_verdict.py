@@ -54,9 +54,9 @@ def test_nothing_missing_says_how_sure_that_is():
 
 
 def test_nothing_missing_is_not_said_where_it_is_not_likely():
-    (line,) = verdict_lines(answer("none", probability=0.14))
+    (line,) = verdict_lines(answer("undecided", probability=0.14))
     assert line == "Not decided: what is left may be noise (14 %) or an effect listed below."
-    ended = replace(answer("none", probability=0.14), ended=TIME_OVER)
+    ended = replace(answer("undecided", probability=0.14), ended=TIME_OVER)
     assert "time was over" in verdict_lines(ended)[1]
 
 

@@ -71,6 +71,17 @@ def test_noise_alone_is_given_a_name_in_few_of_many_tables():
     assert verdicts.count("none") >= 17
 
 
+def test_between_noise_and_an_effect_the_verdict_is_undecided():
+    found = [
+        diagnose(planted(table(np.random.default_rng(3)), (CROSS, size)), LAWS, (ZERO,))
+        for size in (0.6, 1.0, 1.2)
+    ]
+    assert [each.verdict for each in found] == ["none", "undecided", "effect"]
+    assert found[0].probability > 0.5 > found[1].probability
+    (suspect,) = found[1].suspects
+    assert suspect.names == ("cross@part",)
+
+
 @pytest.mark.parametrize("told", [True, False])
 def test_an_effect_is_named_with_its_size_whether_the_noise_is_told_or_not(rng, told):
     units = planted(table(rng, covariance=NOISE if told else None), (CROSS, 4.0))

@@ -164,7 +164,7 @@ def secret(
     seconds: float,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Secret:
-    """Return what a seed draws (see `blind.draw`) of what a diagnosis could find.
+    """Return what a seed draws (see `simulation.size.draw`) of what a diagnosis could find.
 
     What every session sets up anew is no riddle: nothing would be missing.
     """

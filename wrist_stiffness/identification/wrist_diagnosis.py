@@ -148,7 +148,7 @@ def diagnose_sessions(
     unforeseen = {} if reading.unexplained else _much(judge.after.rms(reported), noise)
     together = judge.together(state.fit.base).rms(reported) if unforeseen else {}
     verdict, sure = reading.verdict, reading.probability
-    if (contradicted := _much(together, noise)) and verdict == "none":
+    if (contradicted := _much(together, noise)) and verdict in ("none", "undecided"):
         # So much above the noise is no chance.
         verdict, sure = "unknown", 1.0
     diagnosis = Diagnosis(

@@ -39,7 +39,7 @@ AS_MUCH = "explains as much, with less usual values"
 DETECTABLE = 3.0
 """Standard deviations that an effect of typical size must leave beyond the rest to be seen."""
 
-Verdict = Literal["effect", "none", "unknown"]
+Verdict = Literal["effect", "none", "undecided", "unknown"]
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Reading:
     named : tuple of Class
         These.
     verdict : str
-        `effect`, `none` or `unknown`.
+        `effect`, `none`, `undecided` or `unknown`.
     probability : float
         Of the verdict.
     depends_on : dict of str to float
@@ -205,7 +205,7 @@ def read(search: Search, naming: float = NAMING) -> Reading:
     first, left = search.base.evidence.unexplained, state.evidence.unexplained
     share = min(left / first, 1.0) if first > 0.0 else float(left > 0.0)
     nothing = weights.get(frozenset(), 0.0) * (not search.base.rough)
-    verdict: Verdict = "none"
+    verdict: Verdict = "none" if nothing >= 0.5 else "undecided"
     probability = nothing
     if named:
         verdict, probability = "effect", named[0].probability
@@ -405,7 +405,7 @@ class Diagnosis:
     Parameters
     ----------
     verdict : str
-        ``effect``, ``none`` or ``unknown``.
+        ``effect``, ``none``, ``undecided`` or ``unknown``.
     probability : float
         Of the verdict.
     noise : dict

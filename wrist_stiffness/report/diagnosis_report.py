@@ -235,10 +235,10 @@ def _depends(found: Diagnosed, left: Explained) -> list[Part]:
 def verdict_lines(result: Diagnosis) -> list[str]:
     """Return the verdict in one or two sentences."""
     unforeseen = [_unforeseen(result)] if result.unforeseen else []
-    if result.verdict == "none":
+    if result.verdict in ("none", "undecided"):
         sure = percent(result.probability)
         decided = f"Nothing is missing: what is left is noise ({sure} sure)."
-        if result.probability < 0.5:
+        if result.verdict == "undecided":
             decided = f"Not decided: what is left may be noise ({sure}) or an effect listed below."
         return [decided, *unforeseen, *([] if result.complete else [_unfinished(result)])]
     found = "; ".join(f"{class_of(e)}, {percent(e.probability)} sure" for e in result.findings)
