@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import wrist_stiffness.analysis as analysis_module
+import wrist_stiffness.identification.wrist_diagnosis as diagnosis_module
 from wrist_stiffness.analysis import Analysis, Cancelled
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.inference.search import TIME_OVER
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import effect_at
 from wrist_stiffness.model.registry import find_law
@@ -112,6 +114,14 @@ def test_the_error_falls_with_what_is_added(model, sessions, fitted):
     assert analysis.model is calibrated.model
     assert analysis.preview("backlash@motor_1").log_gain == wrong.log_gain
     assert len(fitted) == 2
+
+
+def test_what_is_asked_of_one_recording_begins_with_the_fit_that_is_known(
+    model, sessions, monkeypatch
+):
+    analysis = Analysis(model, sessions[:1])
+    monkeypatch.setattr(diagnosis_module, "WristProblem", None)
+    assert analysis.rank(seconds=1e-3).diagnosis.ended == TIME_OVER
 
 
 def test_contents_say_what_a_recording_holds(given, sessions):

@@ -270,7 +270,8 @@ class Analysis:
             Findings, and in `diagnosis.standings` every candidate with its probability.
         """
         tell = self._watched(self._tell)
-        return diagnose_sessions(self._known(), self.sessions, naming, seconds, tell)
+        known = self._problem() if len(self.sessions) == 1 else None
+        return diagnose_sessions(self._known(), self.sessions, naming, seconds, tell, known)
 
     def propose(self, naming: float = NAMING, seconds: float = np.inf) -> Proposals:
         """Ask for a law where no effect of the catalogue explains what the newest model leaves.

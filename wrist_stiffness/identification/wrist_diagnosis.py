@@ -90,6 +90,7 @@ def diagnose_sessions(
     naming: float = NAMING,
     seconds: float = np.inf,
     tell: Tell = silent,
+    problem: WristProblem | None = None,
 ) -> WristDiagnosis:
     """Find the effects of the catalogue that a model misses.
 
@@ -106,6 +107,8 @@ def diagnose_sessions(
         Time after which no further fit is begun and no further law is judged.
     tell : callable, optional
         Told what is being done.
+    problem : WristProblem, optional
+        Of this model and its only session, where it is known.
 
     Returns
     -------
@@ -121,8 +124,7 @@ def diagnose_sessions(
     _require_poses(sessions)
     require_limits(naming, seconds)
     units = all_units(model, sessions)
-    chosen = units[:-1] if len(units) > 1 else units
-    problem = WristProblem(model, chosen)
+    problem = problem or WristProblem(model, units[:-1] if len(units) > 1 else units)
     require_units(problem.begin().base.problem)
     search = Search(problem, seconds, tell)
     search.run()
