@@ -217,7 +217,7 @@ class WristProblem:
     def about(self, fit: WristFit) -> WristPoint:
         """Return where candidates are asked: beside all but play, of which the whole fit knows.
 
-        Play would be solved again for each of them.
+        Play would be solved again for each of them; what else has a past does what it did.
         """
         models = []
         for number in range(len(self._sessions)):
@@ -225,7 +225,8 @@ class WristProblem:
             beside = tuple(
                 e for e in own.effects if not (e.name in fit.names and e.law.state_is_a_guess)
             )
-            models.append(replace(own, effects=beside))
+            held = own.held(beside)
+            models.append(replace(own, effects=tuple(held.get(e.name, e) for e in beside)))
         return WristPoint(tuple(models))
 
 
