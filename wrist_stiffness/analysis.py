@@ -36,8 +36,8 @@ from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
-from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.reading import NAMING
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel

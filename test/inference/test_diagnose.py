@@ -18,7 +18,7 @@ from wrist_stiffness.inference import (
     diagnose,
     load_predictor,
 )
-from wrist_stiffness.inference.answer import AS_MUCH
+from wrist_stiffness.inference.reading import AS_MUCH
 
 NOISE = np.eye(2)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.answer import probabilities, read, standings
 from wrist_stiffness.inference.point import Background, Group, Point
 from wrist_stiffness.inference.possible import Possible
+from wrist_stiffness.inference.reading import probabilities, read, standings
 from wrist_stiffness.inference.search import LEADERS, MANY_FITS, TIME_OVER, Search, Trial
 
 ROWS, CANDIDATES = 60, LEADERS + 4

@@ -24,7 +24,7 @@ from wrist_stiffness.identification.free_effects import unfitted
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.wrist_diagnosis import WristDiagnosis, diagnose_sessions
 from wrist_stiffness.inference import Diagnosis
-from wrist_stiffness.inference.answer import NAMING
+from wrist_stiffness.inference.reading import NAMING
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.progress import Progress, silent

@@ -12,12 +12,12 @@ from scipy.special import ndtr
 from wrist_stiffness.comparing.curve import Curve, curve_of
 from wrist_stiffness.identification.likelihood import WristTable
 from wrist_stiffness.identification.questions import finer_questions
-from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.dependence import Dependences, dependences
 from wrist_stiffness.inference.discrepancy import PASSING_DRIFT
 from wrist_stiffness.inference.held_out import time_blocks
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.point import Group, Point
+from wrist_stiffness.inference.reading import NAMING
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.sessions.observing import without_mounting
 from wrist_stiffness.sessions.unit_session import UnitSession

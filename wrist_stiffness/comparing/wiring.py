@@ -18,8 +18,8 @@ from wrist_stiffness.comparing.explained import Explained
 from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.comparing.set_up import INDEPENDENT, without_set_up
 from wrist_stiffness.identification.calibration import said_calibrated
-from wrist_stiffness.inference.answer import NAMING
 from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.reading import NAMING
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.sessions.gauges import Gauge

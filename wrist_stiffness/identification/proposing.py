@@ -30,9 +30,9 @@ from wrist_stiffness.identification.proposal import Proposal, Proposals
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.answer import MEMBER, NAMING, stands_in
 from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.point import Point
+from wrist_stiffness.inference.reading import MEMBER, NAMING, stands_in
 from wrist_stiffness.inference.search import NEGLIGIBLE
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.formula_law import FormulaLaw

@@ -19,21 +19,12 @@ from wrist_stiffness.identification.strained import Strain, strain
 from wrist_stiffness.identification.taken_up import TakenUp, taken_up
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
-from wrist_stiffness.inference.answer import (
-    NAMING,
-    Class,
-    Diagnosis,
-    Finding,
-    NotExcited,
-    Reading,
-    not_shown,
-    read,
-    standings,
-)
+from wrist_stiffness.inference.answer import Diagnosis, Finding, NotExcited
 from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.giving import told
 from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Observations
+from wrist_stiffness.inference.reading import NAMING, Class, Reading, not_shown, read, standings
 from wrist_stiffness.inference.search import TIME_OVER, Search, State
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect

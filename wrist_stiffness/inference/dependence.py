@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrist_stiffness.inference.amplitudes import beside, further, settled, sizes_of
-from wrist_stiffness.inference.answer import MEMBER
 from wrist_stiffness.inference.discrepancy import SLOW_DRIFT
 from wrist_stiffness.inference.evidence import OFF, Array, Evidence
 from wrist_stiffness.inference.point import Background, Point
+from wrist_stiffness.inference.reading import MEMBER
 
 HELD = 3.0
 """Log evidence that a group may gain when the amplitudes of the others follow."""

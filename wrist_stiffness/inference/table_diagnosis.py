@@ -10,17 +10,7 @@ import numpy as np
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.amplitudes import evidence
-from wrist_stiffness.inference.answer import (
-    NAMING,
-    Class,
-    Diagnosis,
-    Finding,
-    NotExcited,
-    not_shown,
-    probabilities,
-    read,
-    standings,
-)
+from wrist_stiffness.inference.answer import Diagnosis, Finding, NotExcited
 from wrist_stiffness.inference.candidates import Candidate, Nuisance, nuisance_columns
 from wrist_stiffness.inference.held_out import HeldOut, bought, speak_for
 from wrist_stiffness.inference.linear import LinearFit, LinearProblem
@@ -29,6 +19,14 @@ from wrist_stiffness.inference.observations import Array, Mask, Observations
 from wrist_stiffness.inference.outliers import FEWEST_UNITS, OUTLIER_LIMIT, lost_units
 from wrist_stiffness.inference.plain_table import Table
 from wrist_stiffness.inference.predictor import LEAST, PredictedSet, Predictor, predicted_set
+from wrist_stiffness.inference.reading import (
+    NAMING,
+    Class,
+    not_shown,
+    probabilities,
+    read,
+    standings,
+)
 from wrist_stiffness.inference.search import NEGLIGIBLE, Search, State
 from wrist_stiffness.inference.shared import component_factors, own_covariance
 from wrist_stiffness.inference.smooth import questions
