@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.inference import Candidate, Observations, Quantity
+from wrist_stiffness.inference import Candidate, Observations, Parameter, Quantity
 
 
 def test_take_keeps_every_column_with_its_unit(rng):
@@ -45,6 +45,10 @@ def test_take_keeps_every_column_with_its_unit(rng):
             {"covariance": np.array([1.0, 1, np.inf, 1])[:, None, None]},
             "covariance is not a number in row 2",
         ),
+        (
+            {"values": np.zeros((4, 2)), "covariance": np.array([[1.0, 0.5], [0.0, 1.0]])},
+            "covariance is not symmetric",
+        ),
         ({"time_s": np.array([0.0, 2, 1, 3])}, "runs backwards"),
     ],
 )
@@ -70,6 +74,19 @@ def test_units_know_their_row_through_several_choices(table):
     some = table.take(np.arange(10, 40)).take(np.array([5, 2]))
     assert some.rows.tolist() == [15, 12]
     assert some.with_values(some.values).rows.tolist() == [15, 12]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"plausible": 0.0}, "size_um: plausible is 0, must be finite and above 0"),
+        ({"scale": np.nan}, "size_um: scale is nan, must be finite and above 0"),
+        ({"lower": 2.0, "upper": 1.0}, "size_um: lower is 2, upper is 1"),
+    ],
+)
+def test_a_parameter_that_no_prior_can_hold_is_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        Parameter("size_um", **change)
 
 
 def test_a_law_without_a_parameter_is_refused():

@@ -43,6 +43,14 @@ class Parameter:
     plausible: float | None = None
     scale: float | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse sizes that no prior can have, and bounds with nothing between them."""
+        for key, size in (("plausible", self.plausible), ("scale", self.scale)):
+            if size is not None and not 0.0 < size < np.inf:
+                raise InputError(f"{self.name}: {key} is {size:g}, must be finite and above 0")
+        if not self.lower < self.upper:
+            raise InputError(f"{self.name}: lower is {self.lower:g}, upper is {self.upper:g}")
+
 
 @dataclass(frozen=True)
 class ShapeParameter:

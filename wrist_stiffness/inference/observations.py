@@ -21,6 +21,9 @@ Mask = NDArray[np.bool_]
 LABELS = ("time_s", "session", "replicate", "samples", "stand")
 """Columns (n,) of a table, where it has them, beside its conditions."""
 
+ROUNDED = 1e-5
+"""Of its largest entry, by which the halves of a covariance written with six digits may differ."""
+
 NUMBERS = "biuf"
 """Kinds of NumPy types that are numbers, or yes and no."""
 
@@ -128,6 +131,10 @@ class Observations:
             row = np.argwhere(~np.isfinite(self.covariance))[0][0]
             where = f" in row {row}" if self.covariance.ndim == 3 else ""
             raise InputError(f"covariance is not a number{where}")
+        if self.covariance is not None:
+            apart = np.abs(self.covariance - np.swapaxes(self.covariance, -1, -2))
+            if (apart > ROUNDED * np.abs(self.covariance).max(axis=(-2, -1), keepdims=True)).any():
+                raise InputError("covariance is not symmetric")
         if self.time_s is not None:
             same_session = np.diff(self.sessions) == 0
             if (np.diff(self.time_s)[same_session] < 0).any():
