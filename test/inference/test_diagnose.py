@@ -396,6 +396,20 @@ def test_blanks_are_not_measured(rng):
     assert named(diagnose(units.with_values(values), LAWS, (ZERO,))) == {"cross@part"}
 
 
+def test_where_every_row_has_a_zero_of_its_own_nothing_could_have_shown(rng):
+    x = rng.normal(size=8)
+    units = Observations(3.0 * x[:, None], {"x": x}, 0.01 * np.eye(1), session=np.arange(8))
+    slope = Candidate(
+        "slope",
+        "part",
+        (Parameter("k", plausible=1.0),),
+        lambda o, s: o.covariates["x"][:, None, None],
+    )
+    zero = Nuisance("zero", lambda o: np.ones((o.n_units, 1, 1)), per_session=True)
+    assert [each.effect for each in diagnose(units, (slope,), (zero,)).not_excited] == ["slope"]
+    assert diagnose(units, (slope,)).not_excited == ()
+
+
 def test_what_is_not_excited_is_listed_with_what_to_record(rng):
     units = table(rng, 120)
     units = replace(units, covariates={**units.covariates, "load": np.zeros(120)})

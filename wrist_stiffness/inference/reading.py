@@ -237,11 +237,10 @@ def _depends_on(state: State) -> dict[str, float]:
 
 def not_shown(search: Search) -> list[str]:
     """Return the candidates of which a typical size would not show."""
-    fitted = {name for names in search.states for name in names}
     return [
         name
         for name, strength in search.strength.items()
-        if name not in fitted and strength < DETECTABLE
+        if name not in search.best.names and strength < DETECTABLE
     ]
 
 
