@@ -32,6 +32,7 @@ ROOMS_USED = {
     "ros": CORE | {"commands", "shipped"},
     "errors": set(),
     "progress": set(),
+    "numerals": set(),
     "atomic_file": set(),
     "inputs": set(),
     "shipped": set(),
@@ -39,7 +40,7 @@ ROOMS_USED = {
     "__main__": {"cli"},
     "__init__": set(),
 }
-COMMON = {"errors", "atomic_file", "inputs", "progress", "topics"}
+COMMON = {"errors", "atomic_file", "inputs", "numerals", "progress", "topics"}
 ROBOT = {"numpy", "scipy", "yaml", "mcap"}
 LIBRARIES_USED = {
     "recording": ROBOT | {"lz4", "zstandard"},  # mcap depends on both

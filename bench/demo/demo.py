@@ -38,7 +38,7 @@ def _run(output: str, seconds: float) -> int:
     from picture import draw_demo
     from run_demo import FAULT, run_demo
 
-    from wrist_stiffness.comparing.sentences import percent
+    from wrist_stiffness.numerals import percent
     from wrist_stiffness.shipped import shipped_file
 
     model = shipped_file("config/palmieri2015_model.yaml")

@@ -9,7 +9,7 @@ import numpy as np
 from before_after import Pass, rms
 from run_demo import DemoResult, Fault
 
-from wrist_stiffness.comparing.sentences import percent
+from wrist_stiffness.numerals import percent
 from wrist_stiffness.report.pictures.figure import FLOOR, colour, new_figure, save_figure
 
 CANDIDATES = 5

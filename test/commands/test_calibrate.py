@@ -10,7 +10,7 @@ from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.simulate import simulate_recording
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.model.model_file import file_sha256, load_model
-from wrist_stiffness.report.page import plus_minus
+from wrist_stiffness.numerals import plus_minus
 from wrist_stiffness.shipped import shipped_file
 from wrist_stiffness.simulation.cell import CellSettings
 

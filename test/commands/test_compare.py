@@ -240,6 +240,6 @@ def test_wrong_use_is_one_line_before_any_work(options, named, capsys):
 
 
 def test_what_was_not_measured_is_no_number_on_a_page():
-    from wrist_stiffness.report.page import number
+    from wrist_stiffness.numerals import number
 
     assert [number(float("nan")), number(12345.6), number(0.01234)] == ["-", "12346", "0.0123"]

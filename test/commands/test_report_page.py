@@ -9,15 +9,7 @@ import pytest
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.report import comparison_report
-from wrist_stiffness.report.page import (
-    Bullets,
-    Page,
-    Picture,
-    Table,
-    drawn,
-    html_of,
-    write_page,
-)
+from wrist_stiffness.report.page import Bullets, Page, Picture, Table, drawn, html_of, write_page
 from wrist_stiffness.report.pictures.figure import new_figure
 
 EVIL = "<script>alert('x')</script> & \"quoted\""

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.inference.search import MANY_FITS, TIME_OVER
+from wrist_stiffness.numerals import percent
 from wrist_stiffness.report.absorbed import absorbed_lines
 from wrist_stiffness.report.diagnosis_report import (
     chance_of,

@@ -184,7 +184,7 @@ def _reveal(arguments: argparse.Namespace, table: Table, settings: CellSettings)
 
 def in_usual_units(magnitude: float, si: str) -> str:
     """Return a magnitude in the units that a diagnosis speaks; what has none stays a number."""
-    from wrist_stiffness.report.page import number
+    from wrist_stiffness.numerals import number
 
     head, per, rest = si.partition("/")
     factor, unit = USUAL_UNITS.get(head, (1.0, head))

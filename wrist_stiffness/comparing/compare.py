@@ -28,6 +28,7 @@ from wrist_stiffness.inference import Observations
 from wrist_stiffness.inference.noise import FEWEST_REPEATS, replicate_variance
 from wrist_stiffness.inference.outliers import FEWEST_UNITS
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.numerals import number
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.observing import Observed, side_by_side
@@ -145,7 +146,7 @@ def wrong_load(
     if _gain(before, after) < VERY_STRONG:
         return ""
     left = " and ".join(
-        f"{after.after[q.key]:.3g} {q.unit} of {q.name}, not {before.after[q.key]:.3g},"
+        f"{q.told(after.after[q.key])}, not {number(before.after[q.key])},"
         for q in before.fit.problem.table.reported
     )
     return suspicion.told(f"a fit leaves {left} and parts nearer to their drawing")

@@ -11,12 +11,13 @@ import numpy as np
 
 from wrist_stiffness.comparing.curve import since_start_s
 from wrist_stiffness.comparing.explained import Explained
-from wrist_stiffness.comparing.sentences import as_values, percent
+from wrist_stiffness.comparing.sentences import as_values
 from wrist_stiffness.identification.questions import LOAD
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Observations, Quantity
 from wrist_stiffness.inference.held_out import time_blocks
 from wrist_stiffness.mechanism.components import Array
+from wrist_stiffness.numerals import number, percent
 
 JUDGES = 12
 """Blocks of units from which the uncertainty of an error is taken."""
@@ -160,7 +161,7 @@ class Comparison:
         return tuple(lines)
 
     def _sizes(self, rms: dict[str, float]) -> str:
-        return " and ".join(f"{rms[q.key]:.3g} {q.unit} of {q.name}" for q in self.quantities)
+        return " and ".join(q.told(rms[q.key]) for q in self.quantities)
 
     def _means(self, found: Explained) -> str:
         state = found.answer.state
@@ -174,7 +175,7 @@ class Comparison:
     def _fall(self, quantity: Quantity) -> str:
         first, last = self.models[0], self.models[-1]
         before, after = first.after[quantity.key].rms, last.after[quantity.key].rms
-        was, is_now = f"{before:.3g}", f"{after:.3g}"
+        was, is_now = number(before), number(after)
         moves = f"{'falls' if after < before else 'rises'} from {was} to {is_now}"
         if was == is_now:
             moves = f"stays at {is_now}"
@@ -182,7 +183,7 @@ class Comparison:
         share = self.headroom(last, quantity.key)
         if share is None or share >= 1.0:
             # Laws of the conditions of a moment know nothing of where the wrist came from.
-            left = f"{self.reachable[quantity.key]:.3g} {quantity.unit}"
+            left = f"{number(self.reachable[quantity.key])} {quantity.unit}"
             return f"{text} (laws of the conditions alone reach {left})."
         return f"{text}: {100.0 * share:.0f} % of what the conditions could explain."
 

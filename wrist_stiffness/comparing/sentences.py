@@ -6,15 +6,7 @@ from typing import Any
 
 from wrist_stiffness.comparing.explained import LEAST, Explained, Told
 from wrist_stiffness.inference.discrepancy import PASSING_DRIFT
-
-
-def percent(share: float) -> str:
-    """Return a probability or share with as many digits as it needs: 7 %, 99 %, 99.9 %."""
-    value = 100.0 * share
-    if value > 99.0:
-        # Not rounded up: nothing is certain.
-        return "over 99.9 %" if value > 99.9 else f"{value:.1f} %"
-    return f"{value:.0f} %" if value >= 1.0 else "under 1 %"
+from wrist_stiffness.numerals import number, percent
 
 
 def sentences(found: Explained) -> tuple[str, ...]:
@@ -42,13 +34,13 @@ def sentence(told: Told, found: Explained) -> str:
     """Return one dependence with its size and what it does."""
     quantities = {q.key: q for q in found.observations.reported}
     parts = " and ".join(
-        f"{size:.2g} of {found.error[key]:.2g} {quantities[key].unit}"
+        f"{number(size, 2)} of {number(found.error[key], 2)} {quantities[key].unit}"
         for key, size in told.sizes.items()
     )
     sure = f"({percent(told.probability)} sure)"
     if told.name == PASSING_DRIFT:
         key = told.curve.quantity.key
-        usual = f"{found.usual_drift[key]:.2g} {quantities[key].unit}"
+        usual = f"{number(found.usual_drift[key], 2)} {quantities[key].unit}"
         return (
             f"The error changes with time, as no recorded condition does {sure}: {parts}; "
             f"an instrument like this drifts by about {usual}."

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.comparing.explained import Explained
-from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.comparing.set_up import INDEPENDENT, without_set_up
 from wrist_stiffness.identification.calibration import said_calibrated
 from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.reading import NAMING
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.numerals import number, percent
 from wrist_stiffness.sessions.gauges import Gauge
 from wrist_stiffness.sessions.measured_session import MOST_BEYOND, MeasuredSession, overloaded
 from wrist_stiffness.sessions.observing import Observed
@@ -250,7 +250,7 @@ def suspected(
     share = min(shares, default=1.0)
     right = {key: size * mistake.unit(key) for key, size in after.items()}
     fall = " and ".join(
-        f"from {before[q.key]:.3g} to {right[q.key]:.3g} {q.unit} of {q.name}"
+        f"from {number(before[q.key])} to {q.told(right[q.key])}"
         for q in left.observations.reported
     )
     # Below the noise what is left of larger positions may be larger.
@@ -351,5 +351,5 @@ def load_too_large(model: ErrorModel, sessions: Sequence[MeasuredSession]) -> st
     if best is NO_LOAD or real or sure < NAMING:
         return f"{said}; check its unit (N, N m), its tare and the sensor's frame"
     error = _error(found[best])
-    sizes = " and ".join(f"{error[q.key]:.3g} {q.unit} of {q.name}" for q in found[best].reported)
+    sizes = " and ".join(q.told(error[q.key]) for q in found[best].reported)
     return f"{said}; with {best.without} the error is {sizes} ({percent(sure)} sure); {best.check}"

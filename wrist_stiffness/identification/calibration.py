@@ -17,6 +17,7 @@ from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.held_out import refuted
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.numerals import number
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.unit_session import all_units
@@ -58,7 +59,7 @@ class Calibration:
         if not self.refused:
             return ()
         worse = " and ".join(
-            f"{self.refused[q.key]:.3g} instead of {self.after[q.key]:.3g} {q.unit} of {q.name}"
+            f"{number(self.refused[q.key])} instead of {q.told(self.after[q.key])}"
             for q in self.fit.problem.table.reported
             if self.refused.get(q.key, 0.0) > self.after.get(q.key, 0.0)
         )

@@ -25,6 +25,7 @@ from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Quantity
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.numerals import number
 from wrist_stiffness.progress import Progress, silent
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.sessions.refitted import AXES, TOLERATED
@@ -150,9 +151,9 @@ class Extension:
             sigma, whole = self._unsure_by[quantity.key], error.get(quantity.key, np.inf)
             if sigma > whole:
                 out.append(
-                    f"it may move the platform by {sigma:.3g} {quantity.unit} more or less, where "
-                    f"the whole error is {whole:.3g}: these recordings do not tell it from the "
-                    "set-up, and nodes would apply all of it"
+                    f"it may move the platform by {number(sigma)} {quantity.unit} more or less, "
+                    f"where the whole error is {number(whole)}: these recordings do not tell it "
+                    "from the set-up, and nodes would apply all of it"
                 )
         if refuted(self.before, self.after):
             out.append("the error on the unseen part GROWS: leave this effect out")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.numerals import number
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
@@ -56,6 +57,10 @@ class Quantity:
     def key(self) -> str:
         """Name and unit, as in ``s_um``."""
         return f"{self.name}_{self.unit}"
+
+    def told(self, size: float, digits: int = 3) -> str:
+        """Return a size in its unit as a sentence has it, as in ``12.3 um of s``."""
+        return f"{number(size, digits)} {self.unit} of {self.name}"
 
 
 @dataclass(frozen=True, eq=False)

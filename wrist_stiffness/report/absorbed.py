@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from wrist_stiffness.identification.taken_up import TakenUp
-from wrist_stiffness.report.page import Table, number, title
+from wrist_stiffness.numerals import number
+from wrist_stiffness.report.page import Table, title
 
 USUAL = 1.0
 """Standard deviations of its prior within which a tolerance needs no line of its own."""

@@ -10,6 +10,7 @@ import numpy as np
 from wrist_stiffness.comparing.comparison import ComparedModel
 from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.inference.noise import at_most
+from wrist_stiffness.numerals import number
 from wrist_stiffness.report.absorbed import absorbed_table
 from wrist_stiffness.report.page import (
     Bullets,
@@ -19,7 +20,6 @@ from wrist_stiffness.report.page import (
     Table,
     drawn,
     lines_of,
-    number,
     provenance_section,
     title,
 )

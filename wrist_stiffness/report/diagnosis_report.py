@@ -8,12 +8,13 @@ from math import nan
 from typing import TYPE_CHECKING
 
 from wrist_stiffness.comparing.explained import Explained
-from wrist_stiffness.comparing.sentences import percent, sentences
+from wrist_stiffness.comparing.sentences import sentences
 from wrist_stiffness.inference import Diagnosis, Finding
 from wrist_stiffness.inference.answer import NotExcited, Standing
 from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.inference.search import TIME_OVER
 from wrist_stiffness.model.registry import find_law
+from wrist_stiffness.numerals import number, percent, plus_minus
 from wrist_stiffness.report.absorbed import absorbed_lines, absorbed_table
 from wrist_stiffness.report.page import (
     Bullets,
@@ -25,8 +26,6 @@ from wrist_stiffness.report.page import (
     Table,
     drawn,
     lines_of,
-    number,
-    plus_minus,
     provenance_section,
     title,
 )
@@ -280,7 +279,7 @@ def rest_lines(result: Diagnosis) -> list[str]:
     if not result.depends_on:
         return []
     left = ", ".join(
-        f"{_name(key)} {size:.2g} {_unit(key)}" for key, size in result.discrepancy.items()
+        f"{_name(key)} {number(size, 2)} {_unit(key)}" for key, size in result.discrepancy.items()
     )
     causes = ", ".join(f"{name} ({percent(part)})" for name, part in result.depends_on.items())
     return [f"Left above the noise: {left}. It depends on {causes}."]

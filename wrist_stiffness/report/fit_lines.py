@@ -12,7 +12,8 @@ from wrist_stiffness.identification.result import FittedParameter
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.noise import at_most
 from wrist_stiffness.model.joint_uncertainty import JointUncertainty
-from wrist_stiffness.report.page import Table, plus_minus, title
+from wrist_stiffness.numerals import number, plus_minus
+from wrist_stiffness.report.page import Table, title
 from wrist_stiffness.sessions.measured_session import MeasuredSession
 from wrist_stiffness.topics import MICROMETRES, MILLIDEGREES
 
@@ -69,8 +70,8 @@ def calibration_lines(found: Calibrated) -> list[str]:
 def uncertainty_line(joint: JointUncertainty) -> str:
     """Tell how well a fit knows where the platform is, for whom."""
     as_measured, in_f = (
-        f"{MICROMETRES * np.linalg.norm(sigma[:3]):.2g} um and "
-        f"{MILLIDEGREES * np.linalg.norm(sigma[3:]):.2g} mdeg"
+        f"{number(MICROMETRES * float(np.linalg.norm(sigma[:3])), 2)} um and "
+        f"{number(MILLIDEGREES * float(np.linalg.norm(sigma[3:])), 2)} mdeg"
         for sigma in (joint.measured, joint.platform)
     )
     return (
@@ -130,7 +131,7 @@ def left_line(fit: WristFit, after: Mapping[str, float], sessions: int) -> str:
     if not fit.rough:
         return f"{where} no more than the noise remains"
     above = " and ".join(
-        f"{fit.discrepancy[q.key]:.3g} {q.unit} of {q.name}"
+        q.told(fit.discrepancy[q.key])
         for q in fit.problem.table.reported
         if fit.discrepancy[q.key] > 0.0
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from wrist_stiffness.comparing.wiring import LOOK_FIRST
 from wrist_stiffness.inference.noise import at_most
+from wrist_stiffness.numerals import number
 from wrist_stiffness.report.page import Table, title
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def compared_lines(rows: Rows) -> list[str]:
         found = []
         for key in POSE:
             size = model["after_registration"].get(key)
-            own = ["-", "-"] if size is None else [f"{size['rms']:.3g}", _noise(values, noise[key])]
+            own = ["-", "-"] if size is None else [number(size["rms"]), _noise(values, noise[key])]
             found += own
         depends = model["depends_on"]
         return [*found, depends[0]["condition"] if depends else "nothing beyond chance"]
@@ -53,7 +54,7 @@ def diagnosed_lines(rows: Rows) -> list[str]:
         found = []
         for key in POSE:
             before, after = (values[when].get(f"rms_{key}") for when in ("before", "after"))
-            fall = "-" if before is None else f"{before:.3g} -> {after:.3g}"
+            fall = "-" if before is None else f"{number(before)} -> {number(after)}"
             found += [fall, "-" if before is None else _noise(values, values["noise"][key])]
         return [*found, _missing(values)]
 
@@ -65,7 +66,7 @@ def diagnosed_lines(rows: Rows) -> list[str]:
 
 
 def _noise(values: Values, size: float) -> str:
-    return f"{at_most(values['noise_known'])} {size:.3g}".strip()
+    return f"{at_most(values['noise_known'])} {number(size)}".strip()
 
 
 def _table(rows: Rows, last: str, cells: Callable[[Values], list[str]], done: str) -> list[str]:

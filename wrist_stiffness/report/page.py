@@ -8,11 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from io import BytesIO
-from math import isfinite, isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
-
-import numpy as np
 
 from wrist_stiffness.atomic_file import writing
 
@@ -213,21 +210,6 @@ def title(key: str) -> str:
     """Return the title of a column by the key of its quantity: of s_um it is s [um]."""
     name, _, unit = key.rpartition("_")
     return f"{name} [{unit}]"
-
-
-def number(value: float, digits: int = 3) -> str:
-    """Return significant digits, without an exponent where a person writes none; NaN is -."""
-    if isnan(value):
-        return "-"
-    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.{digits}g}"
-
-
-def plus_minus(value: float, sigma: float) -> str:
-    """Return a value and its uncertainty with two digits of the latter."""
-    digits = 3
-    if isfinite(sigma) and sigma > 0.0:
-        digits = min(max(1 - int(np.floor(np.log10(sigma))), 0), 9)
-    return f"{round(value, digits) + 0.0:.{digits}f} +- {sigma:.{digits}f}"
 
 
 def provenance_section(provenance: Provenance) -> Sections:

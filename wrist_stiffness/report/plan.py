@@ -11,9 +11,9 @@ from pathlib import Path
 from wrist_stiffness import topics
 from wrist_stiffness.atomic_file import partial_of, remove_orphans
 from wrist_stiffness.commands.plan import COLUMNS, plan_rows
-from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.numerals import percent
 from wrist_stiffness.planning.aims import LONGER, Answer
 from wrist_stiffness.planning.information import chance_right
 from wrist_stiffness.planning.plan import Plan

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wrist_stiffness.lookup.table import Table
+from wrist_stiffness.numerals import number, plus_minus
 from wrist_stiffness.report import page
 
 if TYPE_CHECKING:
@@ -112,7 +113,8 @@ def load_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
     ]
     largest = summary["domain_max"]
     lines.append(
-        f"whole map: s up to {largest['s_um']:.3g} um, phi up to {largest['phi_mdeg']:.3g} mdeg"
+        f"whole map: s up to {number(largest['s_um'])} um, "
+        f"phi up to {number(largest['phi_mdeg'])} mdeg"
     )
     return lines
 
@@ -121,9 +123,9 @@ def mode_lines(summary: ModeSummary) -> list[str]:
     """Return natural frequencies, and for which loads static corrections hold."""
     lines = ["natural frequencies [Hz], motors locked, no damping, operative workspace:"]
     for state, values in summary.items():
-        for number in range(3):
-            lowest, mean, highest = (row[number] for row in values.values())
-            label = f"flanges {state}, mode {number + 1}"
+        for mode in range(3):
+            lowest, mean, highest = (row[mode] for row in values.values())
+            label = f"flanges {state}, mode {mode + 1}"
             lines.append(f"  {label:26} mean {mean:7.1f}   min {lowest:7.1f}   max {highest:7.1f}")
     slowest = summary["at rest"]["min"][0]
     return [
@@ -163,11 +165,8 @@ def tolerance_lines(study: ToleranceStudy) -> list[str]:
     rows = [
         [
             cost.name,
-            page.number(cost.sigma),
-            *(
-                page.plus_minus(*size) if size[1] else page.number(size[0])
-                for size in cost.size.values()
-            ),
+            number(cost.sigma),
+            *(plus_minus(*size) if size[1] else number(size[0]) for size in cost.size.values()),
         ]
         for cost in (*study.costs, study.others, study.whole)
     ]

@@ -14,7 +14,8 @@ from wrist_stiffness.comparing.comparison import lengths
 from wrist_stiffness.comparing.curve import ANGLES, Curve, condition_label, condition_shown
 from wrist_stiffness.inference.observations import Mask, Observations, Quantity
 from wrist_stiffness.mechanism.components import Array
-from wrist_stiffness.report.page import number, typeset
+from wrist_stiffness.numerals import number
+from wrist_stiffness.report.page import typeset
 from wrist_stiffness.report.pictures.figure import COLOURS, FLOOR
 from wrist_stiffness.web.bench import Row
 

@@ -9,10 +9,10 @@ from typing import Any
 from nicegui import ui
 
 from wrist_stiffness.commands.extend import FormulaEffect, direction_of
-from wrist_stiffness.comparing.sentences import percent
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.answer import Standing
 from wrist_stiffness.model.formula_law import FORMULA_PLACES, SIGNALS
+from wrist_stiffness.numerals import percent
 from wrist_stiffness.report.diagnosis_report import chance_of, verdict_lines
 from wrist_stiffness.web.bench import Seen
 from wrist_stiffness.web.figures import spelled

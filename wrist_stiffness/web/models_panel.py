@@ -6,7 +6,7 @@ from functools import partial
 
 from nicegui import events, ui
 
-from wrist_stiffness.report.page import number, plus_minus
+from wrist_stiffness.numerals import number, plus_minus
 from wrist_stiffness.web.figures import spelled
 from wrist_stiffness.web.tab import VERSIONS, Tab
 

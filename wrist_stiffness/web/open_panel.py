@@ -8,7 +8,7 @@ import numpy as np
 from nicegui import events, run, ui
 
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.report.page import number
+from wrist_stiffness.numerals import number
 from wrist_stiffness.sessions.contents import Contents
 from wrist_stiffness.web.examples import EXAMPLES
 from wrist_stiffness.web.figures import spelled

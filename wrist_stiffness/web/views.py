@@ -10,7 +10,7 @@ from nicegui import events, ui
 
 from wrist_stiffness.comparing.curve import condition_label
 from wrist_stiffness.errors import WristError
-from wrist_stiffness.report.page import number
+from wrist_stiffness.numerals import number
 from wrist_stiffness.web.figures import (
     AXES,
     Figure,

@@ -23,7 +23,7 @@ class BushingHardening(Law):
     stage = "reaction"
     places = JOINTS
     sentence = "the bushing of {place} stiffens as its force grows"
-    check = "load the joint in steps with a dial gauge: are equal steps equally large?"
+    check = "load the joint in steps with a dial gauge; see whether equal steps are equally large"
     excited_by = "the same pose under loads of at least three sizes"
     own = (Parameter("hardening_percent_per_N", 0.0, 500.0, 10.0, linear=False, grid=HARDENINGS),)
 

@@ -47,7 +47,9 @@ class LoadScale(Law):
     stage = "load"
     places = ("load_sensor",)
     sentence = "the load sensor reads too much (or too little) by a constant factor"
-    check = "hang a reference weight on the platform: does the sensor say newtons, not kg or kN?"
+    check = (
+        "hang a reference weight on the platform; see whether the sensor says newtons, not kg or kN"
+    )
     excited_by = "loads of several sizes beside a known weight"
     inexactness = 0.0
     own = (Parameter("scale_percent", -50.0, 3000.0, 3.0, linear=False),)

@@ -111,7 +111,7 @@ class TransmissionError(Law):
     stage = "geometry"
     places = MOTORS
     sentence = "the gear of {place} runs unevenly: a wave many times per turn"
-    check = "count the teeth: does the order fit a tooth mesh or a strain-wave generator?"
+    check = "count the teeth; see whether the order fits a tooth mesh or a strain-wave generator"
     excited_by = "slow sweeps of the motor, several samples within a wave"
     many_waves = True
     own = (
