@@ -84,7 +84,7 @@ def test_slopes_that_lead_no_further_do_not_end_a_calibration(model, in_the_cell
     free, held = commissioning(model)
     units = (as_units(model, in_the_cell(model.table, settings, 1)),)
     problem = FitProblem(model.with_effects(*held), units, free)
-    found, _ = fit_cleaned(problem, best_valley(problem))
+    found, _ = fit_cleaned(problem, best_valley(problem).z)
     assert found.variance < 1.0
 
 

@@ -230,32 +230,34 @@ def without_units(sessions: tuple[UnitSession, ...], aside: Mask) -> tuple[UnitS
     return tuple(parts)
 
 
-def best_valley(problem: FitProblem) -> Array:
-    """Return where the best of several fits to a few units of each session ends, (p,) steps.
+def best_valley(problem: FitProblem) -> BaseFit:
+    """Return the best of several fits to a few units of each session.
 
-    Where gaps are free by more than shims leave, a flange touches or does not: the sum of squares
-    has a minimum each, and steps do not go from one to the other.  So the fit begins again over
-    wide differences, where a wrist within its tolerances would be, and with each gap on either
-    side.
+    A flange touches or does not: the sum of squares has a minimum each, and steps do not go from
+    one to the other.  So the fit begins again over wide differences, where a wrist within its
+    tolerances would be, and with each gap on either side.
     """
     few = _few(problem)
     z = np.zeros(len(few.unknowns))
     sharp = _led(few, z)
     for width in WIDTHS:
         z = _led(few, z, width).z
-    found = [sharp, _led(few, z), _led(few, _as_drawn(few))]
+    found = [sharp, _led(few, z)]
+    if (tight := within_tolerances(few.free)) != few.free:
+        found.append(_led(few, _as_drawn(few, tight)))
     for place, unknown in enumerate(few.unknowns):
         if not (unknown.parameter.linear or unknown.effect.law.smooth):
             for side in (-ELSEWHERE, ELSEWHERE):
                 start = sharp.z.copy()
                 start[place] = side
                 found.append(_led(few, np.clip(start, *few.bounds)))
-    return min(found, key=lambda each: each.cost).z
+    best = min(found, key=lambda each: each.cost)
+    return _descended(few, few, few, best.z)
 
 
-def _as_drawn(problem: FitProblem) -> Array:
+def _as_drawn(problem: FitProblem, within: tuple[FreeEffect, ...]) -> Array:
     """Return where a fit ends that holds the wrist within its tolerances, (p,) steps."""
-    tight = replace(problem, free=within_tolerances(problem.free))
+    tight = replace(problem, free=within)
     found = _led(tight, np.zeros(len(tight.unknowns))).z
     ratio = [t.step / own.step for t, own in zip(tight.unknowns, problem.unknowns, strict=True)]
     return found * ratio

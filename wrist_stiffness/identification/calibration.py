@@ -124,7 +124,7 @@ def calibrate(
     problem = FitProblem(start.with_effects(*held), units, free)
     require_units(problem)
     progress(0, STEPS)
-    first, lost = fit_cleaned(problem, best_valley(problem))
+    first, lost = fit_cleaned(problem, best_valley(problem).z)
     progress(1, STEPS)
     judge, set_up = Judge(first), _set_up_of(first.problem, start)
     after, without = (

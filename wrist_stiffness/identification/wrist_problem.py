@@ -68,8 +68,10 @@ class WristProblem:
         first = _cleaned(problem)
         if first.rough:
             # Something is missing only if no valley leads to the noise.
-            again = _cleaned(problem, best_valley(problem))
-            first = first if again.rough else again
+            valley = best_valley(first.base.problem)
+            if not _known(valley, 0).rough:
+                again = _cleaned(problem, valley.z)
+                first = first if again.rough else again
         self._first, self.table, self._sessions = first, first.table, first.problem.sessions
         self._extended: tuple[WristFit, Effect, WristFit] | None = None
         self._near: dict[WristCandidate, WristFit] = {}
@@ -231,7 +233,10 @@ class WristProblem:
 
 
 def _cleaned(problem: FitProblem, start: Array | None = None) -> WristFit:
-    base, lost = fit_cleaned(problem, start)
+    return _known(*fit_cleaned(problem, start))
+
+
+def _known(base: BaseFit, lost: int) -> WristFit:
     return WristFit(base, likelihood_of(base, lost))
 
 
