@@ -10,6 +10,7 @@ the same thing: the same object, with the same state.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import is_
@@ -432,17 +433,44 @@ def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contributio
     """Call a law; whatever goes wrong in a user's own becomes an error that names it."""
     if not effect.law.foreign:
         return effect.law.advance(at, effect.component, effect.si, state)
+    told, wrote = _told(at), []
+    before = [array.tobytes() for array in told.values()]
     try:
-        added, state = effect.law.advance(at, effect.component, effect.si, state)
+        # What it writes into its values is forgotten, and into its state by a preview.
+        own = state if effect.law.state_is_a_guess else deepcopy(state)
+        added, state = effect.law.advance(at, effect.component, dict(effect.si), own)
         added.check(len(at.block), len(at.parts.sectors.gap))
     except MissingSignalError:
         raise
     except WristError as error:
         raise InputError(f"{effect.name}: {error}") from error
     except (Exception, SystemExit) as error:
-        told = f"{effect.name}: {type(error).__name__}: {error}"
-        raise InputError(told + _line_in(effect.law.file, error)) from error
+        said = f"{effect.name}: {type(error).__name__}: {error}"
+        raise InputError(said + _line_in(effect.law.file, error)) from error
+    finally:
+        for (name, array), there in zip(told.items(), before, strict=True):
+            if array.tobytes() != there:
+                # Other laws read it, and a command's angles go on to the motors.
+                array[...] = np.frombuffer(there, array.dtype).reshape(array.shape)
+                wrote.append(name)
+    if wrote:
+        raise InputError(f"{effect.name}: writes into {wrote[0]}; let it take a copy")
     return added, state
+
+
+def _told(at: Situation) -> dict[str, Array]:
+    """Return the arrays that a law is told, by the names that it has for them."""
+    parts = {
+        "at.block.": {**vars(at.block), **at.block.temperatures, **at.block.covariates},
+        "at.configuration.": vars(at.configuration),
+        "at.": {"load": at.load},
+    }
+    return {
+        part + name: array
+        for part, arrays in parts.items()
+        for name, array in arrays.items()
+        if isinstance(array, np.ndarray)
+    }
 
 
 def _line_in(file: Path | None, error: BaseException) -> str:
