@@ -99,6 +99,22 @@ def test_a_tighter_tolerance_costs_less_and_none_costs_nothing(study):
 
 
 @pytest.mark.slow
+def test_a_wrist_keeps_what_the_model_knows_of_it():
+    """Where a tolerance is left out, a calibrated value of its parameter stays what it is."""
+    known = Effect(
+        find_law("axis_misalignment"),
+        "joint_2",
+        {"shift_u_um": Estimate(50.0), "tilt_v_mdeg": Estimate(100.0)},
+    )
+    model = load_model(MODEL).with_effects(known)
+    drawn = tolerances_of({"axis_misalignment@joint_2.shift_u_um": 0.0})
+    (wrist,) = _wrists(model, drawn, np.zeros((1, len(drawn))))
+    (own,) = (effect for effect in wrist if effect.name == known.name)
+    assert {key: each.value for key, each in own.estimates.items()} == {
+        key: each.value for key, each in known.estimates.items()
+    }
+
+
 def test_two_processes_build_the_same_wrists(study):
     assert study_tolerances(MODEL, WRISTS, LOAD, {}, workers=2) == study
 

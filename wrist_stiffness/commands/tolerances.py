@@ -233,7 +233,8 @@ def _wrists(
         own = {effect.name: effect for effect in model.effects}
         for (law, place), changed in by_effect.items():
             if (before := own.get(f"{law}@{place}")) is not None:
-                changed = {k: before.estimates[k].value + value for k, value in changed.items()}
+                had = {key: estimate.value for key, estimate in before.estimates.items()}
+                changed = had | {key: had[key] + value for key, value in changed.items()}
             effect = effect_at(find_law(law), place, changed)
             own[effect.name] = effect
         yield list(own.values())
