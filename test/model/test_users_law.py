@@ -132,3 +132,21 @@ def test_a_preview_forgets_what_a_law_wrote_into_its_state(model):
     pure, in_place = ([each.positions.tolist() for each in own] for own in answers)
     assert in_place == pure
     assert pure != angles
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        (lambda parts: 1 / 0, "own@platform: ZeroDivisionError"),
+        (lambda parts: None, "own@platform: changed gives a NoneType, not ElasticComponents"),
+    ],
+)
+def test_a_law_that_cannot_change_the_parts_is_one_clear_error(model, changed, text):
+    class Softens(Own):
+        stage = "parts"
+
+        def changed(self, parts, place, values):
+            return changed(parts)
+
+    with pytest.raises(InputError, match=text):
+        with_own(model, Softens()).predict(np.zeros(2), Load(np.zeros(6)))

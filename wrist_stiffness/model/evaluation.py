@@ -10,19 +10,15 @@ the same thing: the same object, with the same state.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import is_
-from pathlib import Path
-from traceback import extract_tb
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.errors import InputError, WristError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
@@ -42,6 +38,7 @@ from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.prediction import seen
 from wrist_stiffness.model.situation import BlockStatics, Situation, lengths
 from wrist_stiffness.model.slopes import only_constants_differ, with_constants
+from wrist_stiffness.model.users_law import advanced_by
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -337,7 +334,7 @@ def _advanced(
     if known is not None:
         return known
     try:
-        added, after = _advanced_by(effect, at, _near(effect, state, near))
+        added, after = advanced_by(effect, at, _near(effect, state, near))
     except MissingSignalError as missing:
         signal = str(missing)
         said = left_out(effect.name, signal)
@@ -425,58 +422,8 @@ def home_of(table: Table, parts: ElasticComponents) -> Situation:
 
 def constant_of(effect: Effect, home: Situation) -> Constants:
     """Return what a constant effect adds at home."""
-    added, _ = _advanced_by(effect, home, None)
+    added, _ = advanced_by(effect, home, None)
     return Constants.of_home(effect.component, added, _first_order(effect, added))
-
-
-def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contribution, Any]:
-    """Call a law; whatever goes wrong in a user's own becomes an error that names it."""
-    if not effect.law.foreign:
-        return effect.law.advance(at, effect.component, effect.si, state)
-    told, wrote = _told(at), []
-    before = [array.tobytes() for array in told.values()]
-    try:
-        # What it writes into its values is forgotten, and into its state by a preview.
-        own = state if effect.law.state_is_a_guess else deepcopy(state)
-        added, state = effect.law.advance(at, effect.component, dict(effect.si), own)
-        added.check(len(at.block), len(at.parts.sectors.gap))
-    except MissingSignalError:
-        raise
-    except WristError as error:
-        raise InputError(f"{effect.name}: {error}") from error
-    except (Exception, SystemExit) as error:
-        said = f"{effect.name}: {type(error).__name__}: {error}"
-        raise InputError(said + _line_in(effect.law.file, error)) from error
-    finally:
-        for (name, array), there in zip(told.items(), before, strict=True):
-            if array.tobytes() != there:
-                # Other laws read it, and a command's angles go on to the motors.
-                array[...] = np.frombuffer(there, array.dtype).reshape(array.shape)
-                wrote.append(name)
-    if wrote:
-        raise InputError(f"{effect.name}: writes into {wrote[0]}; let it take a copy")
-    return added, state
-
-
-def _told(at: Situation) -> dict[str, Array]:
-    """Return the arrays that a law is told, by the names that it has for them."""
-    parts = {
-        "at.block.": {**vars(at.block), **at.block.temperatures, **at.block.covariates},
-        "at.configuration.": vars(at.configuration),
-        "at.": {"load": at.load},
-    }
-    return {
-        part + name: array
-        for part, arrays in parts.items()
-        for name, array in arrays.items()
-        if isinstance(array, np.ndarray)
-    }
-
-
-def _line_in(file: Path | None, error: BaseException) -> str:
-    """Return which line of a user's own file an error came through last, empty for none."""
-    lines = [at.lineno for at in extract_tb(error.__traceback__) if Path(at.filename) == file]
-    return f" ({file.name}, line {lines[-1]})" if file is not None and lines else ""
 
 
 def _first_order(effect: Effect, added: Contribution) -> tuple[str, ...]:
