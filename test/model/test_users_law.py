@@ -9,6 +9,7 @@ from wrist_stiffness.compensation.correction_stream import CorrectionStream
 from wrist_stiffness.compensation.parameters import stream_settings
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.block import Load, Sample
+from wrist_stiffness.model.contribution import Contribution
 from wrist_stiffness.model.effect import Effect
 from wrist_stiffness.model.law import Law
 from wrist_stiffness.model.parameters import Estimate, Parameter
@@ -150,3 +151,17 @@ def test_a_law_that_cannot_change_the_parts_is_one_clear_error(model, changed, t
 
     with pytest.raises(InputError, match=text):
         with_own(model, Softens()).predict(np.zeros(2), Load(np.zeros(6)))
+
+
+@pytest.mark.parametrize("field", ["both", "through"])
+def test_a_constant_law_adds_what_a_constant_can(model, field):
+    shape = {"both": (1, 6), "through": (1, 8, 6)}[field]
+
+    class Constantly(Own):
+        constant = True
+
+        def added(self, at, place, values):
+            return Contribution(**{field: np.ones(shape)})
+
+    with pytest.raises(InputError, match="own@platform: a law with constant = True cannot"):
+        with_own(model, Constantly()).predict(np.zeros(2), Load(np.zeros(6)))

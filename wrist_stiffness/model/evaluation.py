@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
@@ -421,8 +422,13 @@ def home_of(table: Table, parts: ElasticComponents) -> Situation:
 
 
 def constant_of(effect: Effect, home: Situation) -> Constants:
-    """Return what a constant effect adds at home."""
+    """Return what a constant effect adds at home (InputError where no constant can be that)."""
     added, _ = advanced_by(effect, home, None)
+    if added.both is not None or added.through is not None:
+        raise InputError(
+            f"{effect.name}: a law with constant = True cannot move both limbs, at the frame or "
+            "the platform, or push through parts; let it be without"
+        )
     return Constants.of_home(effect.component, added, _first_order(effect, added))
 
 
