@@ -132,6 +132,40 @@ def test_the_way_to_a_point_of_a_plan_is_no_motion(model):
         assert np.allclose(found, (at_rest, moving), rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("rate_hz", [100, 1000])
+def test_a_correction_that_is_tried_is_no_motion_either(model, rate_hz):
+    """Commands without speeds are corrected as those with them."""
+    mass = effect_at(find_law("inertia"), "platform", {"mass_g": 300.0, "z_mm": -30.0})
+    ends = []
+    for speeds in ((), (0.0, 0.0)):
+        stream = CorrectionStream(model.with_effects(mass), EVERY_LOAD, enabled=True)
+        for number in range(rate_hz // 5):
+            stamp_ns = SECOND + number * SECOND // rate_hz
+            stream.loads.add(stamp_ns, "wrist_base", (2.0, 2.0, -3.0), (0.0, 0.0, 0.0))
+            done = stream.on_command(stamp_ns, "", NAMES[::-2], (0.1, 0.3), speeds)
+            assert done.fault is None
+        ends.append(stream.applied.tolist())
+    assert ends[0] == ends[1]
+    assert any(ends[0])
+
+
+def test_a_command_without_speeds_has_those_of_the_way_from_the_last(model):
+    turn = FormulaLaw("own", "platform", np.eye(6)[3], "1e-3 * theta_dot_1 * k", [], ["k"])
+    moving = model.with_effects(Effect(turn, "platform", {}))
+    sent = []
+    for said in (lambda speed: (), lambda speed: (speed, 0.0)):
+        stream = CorrectionStream(moving, EVERY_LOAD, enabled=True)
+        stamps = SECOND + np.array([0, 1, 1, 3, 4, 2]) * SECOND // 100
+        angles = 0.1 + 0.01 * np.arange(6)
+        steps, passed = np.diff(angles, prepend=angles[0]), np.diff(stamps, prepend=SECOND)
+        for stamp_ns, angle, step, ns in zip(stamps.tolist(), angles, steps, passed, strict=True):
+            stream.loads.add(stamp_ns, "wrist_base", (0.0, 0.0, -3.0), (0.0, 0.0, 0.0))
+            speed = float(step * (SECOND / ns)) if ns > 0 else 0.0
+            done = stream.on_command(stamp_ns, "", NAMES[::-2], (float(angle), 0.3), said(speed))
+            sent.append(done.positions.tolist())
+    assert sent[:6] == sent[6:]
+
+
 BAD = {
     "short": ((0.0, 0.0), (), (), "2 positions for 3 names"),
     "nan": ((0.0, float("nan"), 0.0), (), (), "positions .* are not finite"),
