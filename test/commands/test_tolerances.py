@@ -1,5 +1,6 @@
 """Which tolerance costs how much: against one alone, and on any number of processes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,16 @@ def test_a_wrist_keeps_what_the_model_knows_of_it():
     assert {key: each.value for key, each in own.estimates.items()} == {
         key: each.value for key, each in known.estimates.items()
     }
+
+
+def test_a_wrist_without_flanges_has_nothing_to_shim():
+    model = load_model(MODEL)
+    bare = replace(
+        model, table=replace(model.table, components=replace(model.table.components, contact={}))
+    )
+    drawn = tolerances_of({})
+    (wrist,) = _wrists(bare, drawn, np.ones((1, len(drawn))))
+    assert {effect.name for effect in wrist} == {f"{each.law}@{each.place}" for each in drawn}
 
 
 def test_two_processes_build_the_same_wrists(study):

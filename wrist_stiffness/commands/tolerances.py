@@ -227,9 +227,9 @@ def _wrists(
         by_effect: dict[tuple[str, str], dict[str, float]] = {}
         for tolerance, value in zip(tolerances, values.tolist(), strict=True):
             by_effect.setdefault((tolerance.law, tolerance.place), {})[tolerance.key] = value
-        for joint, shim in zip(shims, np.array(list(shims.values())) @ values, strict=True):
+        for joint, shim in shims.items():
             gap = by_effect.setdefault((GAPS, joint), {})
-            gap["gap_um"] = gap.get("gap_um", 0.0) + float(shim)
+            gap["gap_um"] = gap.get("gap_um", 0.0) + float(shim @ values)
         own = {effect.name: effect for effect in model.effects}
         for (law, place), changed in by_effect.items():
             if (before := own.get(f"{law}@{place}")) is not None:
