@@ -239,6 +239,11 @@ def test_statistics_are_those_of_the_closed_form(tmp_path, monkeypatch, capsys):
         (["-o", "a_file"], "a_file: cannot be made"),
         (["--modes", "--payload", "0", "0", "0", "0"], "payload of 0 kg is not above 0"),
         (["--modes", "--payload-inertia", "1", "1", "1"], "needs its mass and place"),
+        (["--payload", "1", "0", "0", "-30"], "--payload and --payload-inertia belong to --modes"),
+        (["--payload-inertia", "1", "1", "1"], "--payload and --payload-inertia belong to --modes"),
+        (["--modes", "--load", "0", "0", "-1"], "--load and --at do not go with --modes"),
+        (["--modes", "--at", "0", "0", "0"], "--load and --at do not go with --modes"),
+        (["--at", "20", "0", "-18"], "--at says where --load acts, which is missing"),
     ],
 )
 def test_show_refuses(small_table, tmp_path, monkeypatch, refused, options, named):

@@ -300,4 +300,17 @@ def test_what_the_model_had_to_leave_out_is_said(tmp_path, warm_and_humid, capsy
     assert sorted(summary.warnings.values()) == [3, 3]
     command = ["replay", str(source), "-o", str(tmp_path / "again")]
     assert main([*command, "--model", str(warm_and_humid)]) == 0
-    assert "3 predictions: thermal_softening@joint_1: " in capsys.readouterr().out
+    assert "3 predictions, the first: thermal_softening@joint_1: " in capsys.readouterr().out
+
+
+def test_a_warning_that_differs_in_its_numbers_alone_is_one_line(tmp_path):
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        f"schema: 1\nname: m\ntable: {{path: {shipped_file('precomputed/palmieri2015.npz')}}}\n"
+        "effects: [{effect: formula, id: own, component: platform, direction: [0, 0, 0, 0, 0, 1], "
+        "expression: size * time, parameters: {size: 1.0}}]\n"
+    )
+    summary = replay(write(tmp_path / "in", TIMELINE), path, tmp_path / "out")
+    ((text, count),) = summary.warnings.items()
+    assert text.startswith("own@platform: turns by 10.00 mrad, past the first order")
+    assert count == 3

@@ -1,5 +1,6 @@
 """Which tolerance costs how much: against one alone, and on any number of processes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,32 @@ def test_a_tighter_tolerance_costs_less_and_none_costs_nothing(study):
 
 
 @pytest.mark.slow
+def test_a_wrist_keeps_what_the_model_knows_of_it():
+    """Where a tolerance is left out, a calibrated value of its parameter stays what it is."""
+    known = Effect(
+        find_law("axis_misalignment"),
+        "joint_2",
+        {"shift_u_um": Estimate(50.0), "tilt_v_mdeg": Estimate(100.0)},
+    )
+    model = load_model(MODEL).with_effects(known)
+    drawn = tolerances_of({"axis_misalignment@joint_2.shift_u_um": 0.0})
+    (wrist,) = _wrists(model, drawn, np.zeros((1, len(drawn))))
+    (own,) = (effect for effect in wrist if effect.name == known.name)
+    assert {key: each.value for key, each in own.estimates.items()} == {
+        key: each.value for key, each in known.estimates.items()
+    }
+
+
+def test_a_wrist_without_flanges_has_nothing_to_shim():
+    model = load_model(MODEL)
+    bare = replace(
+        model, table=replace(model.table, components=replace(model.table.components, contact={}))
+    )
+    drawn = tolerances_of({})
+    (wrist,) = _wrists(bare, drawn, np.ones((1, len(drawn))))
+    assert {effect.name for effect in wrist} == {f"{each.law}@{each.place}" for each in drawn}
+
+
 def test_two_processes_build_the_same_wrists(study):
     assert study_tolerances(MODEL, WRISTS, LOAD, {}, workers=2) == study
 

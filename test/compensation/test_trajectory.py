@@ -11,7 +11,10 @@ from wrist_stiffness.compensation.settings import StreamSettings
 from wrist_stiffness.compensation.trajectory_plan import planned_point
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.mechanism.compiled import CorrectedRows
+from wrist_stiffness.model.effect import Effect, effect_at
 from wrist_stiffness.model.error_model import ErrorModel
+from wrist_stiffness.model.formula_law import FormulaLaw
+from wrist_stiffness.model.registry import find_law
 
 NAMES = ("motor_2_joint", "gripper", "motor_1_joint")
 SECOND = 1_000_000_000
@@ -100,6 +103,67 @@ def test_what_is_not_corrected_has_nothing_of_what_was_in_memory(stream, monkeyp
     answer = stream.on_trajectory(SECOND, "", NAMES, [planned])
     assert answer.fault is None
     assert np.isfinite(answer.points[0].positions).all()
+
+
+def sent(model, effects, pause_ms, speed):
+    """Return what is added to a plan that begins some time after a command."""
+    stream = CorrectionStream(model.with_effects(*effects), EVERY_LOAD, enabled=True)
+    last_ns = SECOND + 10_000_000
+    begin_ns = last_ns + 1_000_000 * pause_ms
+    for stamp_ns in (SECOND, last_ns, begin_ns):
+        stream.loads.add(stamp_ns, "wrist_base", (0.0, 0.0, -0.5), (0.0, 0.0, 0.0))
+    for stamp_ns in (SECOND, last_ns):
+        stream.on_command(stamp_ns, "", NAMES[::-2], (0.0, 0.0))
+    points = [planned_point(2, (angle, 0.0), speed) for angle in (0.0, 0.1, 0.6)]
+    done = stream.on_trajectory(begin_ns, "", NAMES[::-2], points)
+    assert done.fault is None
+    return np.array([a.positions - b.positions for a, b in zip(done.points, points, strict=True)])
+
+
+def test_the_way_to_a_point_of_a_plan_is_no_motion(model):
+    """Its speed is what the plan says, if anything, however soon after the last command."""
+    viscous = FormulaLaw("own", "platform", np.eye(6)[3], "1e-4 * theta_dot_1 * k", [], ["k"])
+    mass = effect_at(find_law("inertia"), "platform", {"mass_g": 100.0, "z_mm": -30.0})
+    effects = mass, Effect(viscous, "platform", {})
+    at_rest, moving = sent(model, (), 0, ()), sent(model, effects, 0, (1.0, 0.0))
+    assert np.abs(moving - at_rest).max() > 1e-5
+    for pause_ms in (1, 10, 500):
+        found = sent(model, effects, pause_ms, ()), sent(model, effects, pause_ms, (1.0, 0.0))
+        assert np.allclose(found, (at_rest, moving), rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("rate_hz", [100, 1000])
+def test_a_correction_that_is_tried_is_no_motion_either(model, rate_hz):
+    """Commands without speeds are corrected as those with them."""
+    mass = effect_at(find_law("inertia"), "platform", {"mass_g": 300.0, "z_mm": -30.0})
+    ends = []
+    for speeds in ((), (0.0, 0.0)):
+        stream = CorrectionStream(model.with_effects(mass), EVERY_LOAD, enabled=True)
+        for number in range(rate_hz // 5):
+            stamp_ns = SECOND + number * SECOND // rate_hz
+            stream.loads.add(stamp_ns, "wrist_base", (2.0, 2.0, -3.0), (0.0, 0.0, 0.0))
+            done = stream.on_command(stamp_ns, "", NAMES[::-2], (0.1, 0.3), speeds)
+            assert done.fault is None
+        ends.append(stream.applied.tolist())
+    assert ends[0] == ends[1]
+    assert any(ends[0])
+
+
+def test_a_command_without_speeds_has_those_of_the_way_from_the_last(model):
+    turn = FormulaLaw("own", "platform", np.eye(6)[3], "1e-3 * theta_dot_1 * k", [], ["k"])
+    moving = model.with_effects(Effect(turn, "platform", {}))
+    sent = []
+    for said in (lambda speed: (), lambda speed: (speed, 0.0)):
+        stream = CorrectionStream(moving, EVERY_LOAD, enabled=True)
+        stamps = SECOND + np.array([0, 1, 1, 3, 4, 2]) * SECOND // 100
+        angles = 0.1 + 0.01 * np.arange(6)
+        steps, passed = np.diff(angles, prepend=angles[0]), np.diff(stamps, prepend=SECOND)
+        for stamp_ns, angle, step, ns in zip(stamps.tolist(), angles, steps, passed, strict=True):
+            stream.loads.add(stamp_ns, "wrist_base", (0.0, 0.0, -3.0), (0.0, 0.0, 0.0))
+            speed = float(step * (SECOND / ns)) if ns > 0 else 0.0
+            done = stream.on_command(stamp_ns, "", NAMES[::-2], (float(angle), 0.3), said(speed))
+            sent.append(done.positions.tolist())
+    assert sent[:6] == sent[6:]
 
 
 BAD = {

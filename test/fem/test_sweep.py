@@ -8,7 +8,7 @@ import yaml
 
 from wrist_stiffness.commands.table import check
 from wrist_stiffness.errors import TableError
-from wrist_stiffness.fem import sweep
+from wrist_stiffness.fem import condensed_store, sweep
 from wrist_stiffness.fem.components import elastic_components
 from wrist_stiffness.fem.condensed_store import CondensedStore, condense_solid
 from wrist_stiffness.fem.error_budget import FINE_RINGS, ORDERS
@@ -24,6 +24,7 @@ from wrist_stiffness.lookup.verification import (
     relative_misses,
     unseen_poses,
 )
+from wrist_stiffness.mechanism.geometry_file import geometry_from_values
 from wrist_stiffness.mechanism.statics import contact_operators
 from wrist_stiffness.shipped import shipped_file
 
@@ -81,6 +82,13 @@ def test_an_interrupted_build_goes_on_where_it_was(values, tmp_path, monkeypatch
     assert np.array_equal(again.operators, table.operators)
     CondensedStore(tmp_path / "p").remove()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_part_of_another_version_is_condensed_again(values, monkeypatch):
+    solid = wrist_parts(geometry_from_values(values))[0].solid
+    before = condensed_store._key(solid, COARSE.sizes, "rigid")
+    monkeypatch.setattr(condensed_store, "__version__", "0.0.1")
+    assert condensed_store._key(solid, COARSE.sizes, "rigid") != before
 
 
 @pytest.mark.slow

@@ -305,6 +305,16 @@ LINEARISED = """def linearised(self, place, signals):
             OWN.replace('stage = "geometry"', 'stage = "friction"\n    state_is_a_guess = True'),
             "the state of Twist, a friction, cannot be a guess",
         ),
+        (OWN.replace("def advance", "def advanse"), "Twist does not define advance or added"),
+        (OWN.replace('"geometry"', '"parts"'), "Twist does not define changed"),
+        (
+            OWN.replace("    stage =", "    def __init__(self, size): ...\n    stage ="),
+            r"own.py:Twist: Twist\(\): TypeError: .* missing 1 required",
+        ),
+        (
+            OWN.replace('"{place} is turned"', '"{plate} is turned"'),
+            r"own.py:Twist: sentence\('platform'\): KeyError: 'plate'",
+        ),
     ],
 )
 def test_bad_law_files_give_one_line(tmp_path, own, text):
@@ -321,6 +331,7 @@ def test_bad_law_files_give_one_line(tmp_path, own, text):
         ),
         ("return Contribution(wrench=np.zeros((2, 6))), None", r"wrench has shape \(2, 6\)"),
         ("return Contribution(both=np.full((1, 6), np.nan)), None", "both is not finite"),
+        ("return at.screw(place, 1j * np.ones((1, 6))), None", "both holds complex128, not real"),
         ("return None, None", "twist@platform: AttributeError"),
         ("return 3", "twist@platform: TypeError"),
         ("raise SystemExit(0)", "twist@platform: SystemExit: 0"),
@@ -341,6 +352,14 @@ def test_a_broken_law_of_ones_own_is_one_clear_error(tmp_path, body, text):
     with pytest.raises(InputError, match=text) as caught:
         model.predict(np.zeros(2), Load(np.zeros(6)))
     assert "twist@platform" in str(caught.value)
+
+
+def test_the_line_of_a_broken_law_is_told_of_a_model_in_this_folder(tmp_path, monkeypatch):
+    write(tmp_path, own=OWN.replace("return at", "1 / 0; return at"))
+    monkeypatch.chdir(tmp_path)
+    model = load_model("m.yaml")
+    with pytest.raises(InputError, match=r"ZeroDivisionError: .* \(own.py, line \d+\)"):
+        model.with_effects(model.effects[-1]).predict(np.zeros(2), Load(np.zeros(6)))
 
 
 def test_twice_the_same_effect_is_refused(tmp_path):

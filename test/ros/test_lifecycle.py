@@ -231,6 +231,20 @@ def test_a_tare_outlives_its_node_for_a_while(graph, tmp_path):
     assert graph.add(PoseErrorPredictor, **needed).health.faults == 1
 
 
+def test_a_tare_ends_with_the_frames_that_it_was_taken_in(graph, tmp_path):
+    frames = "{{ft: {{parent: wrist_platform, acts_on: {}}}}}"
+    needed = {"state_folder": str(tmp_path), "load_age_limit_s": 60.0}
+    node = graph.add(PoseErrorPredictor, frames=frames.format("platform"), **needed)
+    graph.load(SECOND, (0, 0, -2.0, 0, 0, 0), "ft")
+    graph.until(lambda: node.stream.loads.newest_ns, "load")
+    assert graph.call(Trigger, "/pose_error_predictor/tare", Trigger.Request()).success
+    node.set_parameters([Parameter("load_age_limit_s", value=50.0)])
+    assert node.stream.loads.zero is not None
+    node.set_parameters([Parameter("frames", value=frames.format("environment"))])
+    assert node.stream.loads.zero is None
+    assert not list(tmp_path.iterdir())
+
+
 def test_all_nodes_change_or_none(graph, model, tmp_path):
     """A model that one of them cannot load changes none; what all agree to changes all."""
     path = tmp_path / "model.yaml"

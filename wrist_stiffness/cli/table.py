@@ -19,6 +19,7 @@ from wrist_stiffness.cli.parser import (
     value,
 )
 from wrist_stiffness.cli.progress import Progress
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.shipped import shipped_file
 
 SHIPPED = shipped_file("config/palmieri2015.yaml")
@@ -155,7 +156,6 @@ def check(arguments: argparse.Namespace) -> int:
         "MM",
         nargs=3,
         type=float,
-        default=(0.0, 0.0, 0.0),
     ),
     flag("--modes", "natural frequencies and mode shapes"),
     option(
@@ -192,6 +192,12 @@ def show(arguments: argparse.Namespace) -> int:
     from wrist_stiffness.report.pictures.table import draw_maps, draw_modes
     from wrist_stiffness.report.terminal import fact_lines, load_lines, mode_lines
 
+    if arguments.modes and (arguments.load or arguments.at):
+        raise InputError("--load and --at do not go with --modes, which has --payload")
+    if not arguments.modes and (arguments.payload or arguments.payload_inertia):
+        raise InputError("--payload and --payload-inertia belong to --modes")
+    if arguments.at and not arguments.load:
+        raise InputError("--at says where --load acts, which is missing")
     shown = table_named(arguments)
     values: Any
     if arguments.modes:
@@ -203,7 +209,7 @@ def show(arguments: argparse.Namespace) -> int:
     else:
         push = None
         if arguments.load is not None:
-            push = Push.of_millimetres(whole_load(arguments.load), arguments.at)
+            push = Push.of_millimetres(whole_load(arguments.load), arguments.at or (0.0,) * 3)
         pictures = draw_maps(shown, arguments.output, push)
         values = table.summarise(shown)
         lines = [*fact_lines(shown), *load_lines(values)]

@@ -99,8 +99,16 @@ class ReplaySummary:
 
     def refuse(self, topic: str, reason: object) -> None:
         """Count a message of a topic that gave no result."""
-        text = f"{topic}: {reason}"
-        self.refused[self._first_of_kind.setdefault(NUMBER.sub("#", text), text)] += 1
+        self.refused[self._first_like(f"{topic}: {reason}")] += 1
+
+    def warn(self, warnings: Mapping[str, int]) -> None:
+        """Count warnings of predictions, each with how often it was given."""
+        for text, count in warnings.items():
+            self.warnings[self._first_like(text)] += count
+
+    def _first_like(self, text: str) -> str:
+        """Return the first text that differs in its numbers alone."""
+        return self._first_of_kind.setdefault(NUMBER.sub("#", text), text)
 
     def as_values(self) -> dict[str, Any]:
         """Return the counts and reasons as programs read them."""
@@ -296,7 +304,7 @@ class BlockReplay:
     ) -> None:
         """Add what is said of n joint states; `at`: their rows in the block and log times [ns]."""
         summary = self.summary
-        summary.warnings.update(predicted.warnings)
+        summary.warn(predicted.warnings)
         known = np.flatnonzero(predicted.known)
         summary.predictions += len(known)
         twist, stamps = predicted.twist[known], stamps[known]

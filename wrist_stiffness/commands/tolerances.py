@@ -227,13 +227,14 @@ def _wrists(
         by_effect: dict[tuple[str, str], dict[str, float]] = {}
         for tolerance, value in zip(tolerances, values.tolist(), strict=True):
             by_effect.setdefault((tolerance.law, tolerance.place), {})[tolerance.key] = value
-        for joint, shim in zip(shims, np.array(list(shims.values())) @ values, strict=True):
+        for joint, shim in shims.items():
             gap = by_effect.setdefault((GAPS, joint), {})
-            gap["gap_um"] = gap.get("gap_um", 0.0) + float(shim)
+            gap["gap_um"] = gap.get("gap_um", 0.0) + float(shim @ values)
         own = {effect.name: effect for effect in model.effects}
         for (law, place), changed in by_effect.items():
             if (before := own.get(f"{law}@{place}")) is not None:
-                changed = {k: before.estimates[k].value + value for k, value in changed.items()}
+                had = {key: estimate.value for key, estimate in before.estimates.items()}
+                changed = had | {key: had[key] + value for key, value in changed.items()}
             effect = effect_at(find_law(law), place, changed)
             own[effect.name] = effect
         yield list(own.values())

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.free_effects import SHIM_UM
 from wrist_stiffness.lookup.response import respond
 from wrist_stiffness.lookup.table import Table
@@ -31,6 +32,7 @@ from wrist_stiffness.mechanism.components import (
     Array,
     ElasticComponents,
 )
+from wrist_stiffness.mechanism.kinematics import angles_text
 from wrist_stiffness.mechanism.material import Material
 from wrist_stiffness.mechanism.pins import pin_flexibilities
 from wrist_stiffness.mechanism.rigid_motion import log_motion
@@ -92,14 +94,22 @@ def second_order(table: Table) -> dict[str, float]:
     """Return how far first order is from the equilibrium of all bodies with finite rotations.
 
     `table`: the lookup, taken in closed form.  Gives error of s and phi that 99 of 100 poses and
-    loads keep, relative to their lengths.
+    loads keep, relative to their lengths.  Raises `InputError` where there is no equilibrium.
     """
     poses, loads = _draws(table, EXACT_DRAWS)
     configuration = table.mechanism.forward(poses)
     found = respond(table.operators_at(configuration, "closed_form"), loads).twist
     exact = []
     for theta, load, platform in zip(poses, loads, configuration.platform, strict=True):
-        state = exact_equilibrium(table, theta, load)
+        try:
+            state = exact_equilibrium(table, theta, load)
+        except InputError as error:
+            limits, gravity = table.geometry.limits, np.linalg.norm(table.geometry.gravity)
+            raise InputError(
+                f"the wrist finds no rest at motor angles {angles_text(theta)}: limits.force_N = "
+                f"{limits.force:g}, limits.moment_Nm = {limits.moment:g} or a gravity of "
+                f"{gravity:g} m/s^2 bends it too far: another unit?"
+            ) from error
         exact.append(log_motion(state.rotation @ platform.T, state.shift))
     return _bound(relative_misses(found, np.array(exact)))
 

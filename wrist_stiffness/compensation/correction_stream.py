@@ -62,6 +62,7 @@ class CorrectionStream(Stream):
         self.active = True
         self._corrector = Corrector()
         self._enabled = enabled
+        self._commanded: tuple[int, Array] | None = None  # last stamp [ns] and angles
 
     def _used(self, model: ErrorModel) -> ErrorModel:
         """Leave out what is wrong with a measurement alone: commands are no measurement."""
@@ -123,14 +124,14 @@ class CorrectionStream(Stream):
         `stamp_ns`: its stamp [ns], 0 for none: no load belongs to it, and the correction fades out.
         `frame_id`: its header's frame; `wrist_corrected` marks a command that was corrected
         already.  `names`, `positions`, `velocities`: as in sensor_msgs/JointState [rad, rad/s];
-        speeds that are absent or not finite are taken as differences of the angles.  `came_ns`:
+        speeds that are absent or not finite are taken as differences of commands.  `came_ns`:
         when it came [ns], the time of a command without a stamp.  Gives `CorrectedCommand`:
         with the fault, and on the way to no correction, wherever one cannot be had safely.  Raises
         `InputError` if a motor is missing, an angle is not finite or beyond the joint limits: such
         a command is not to be forwarded.
         """
         theta = self._motor_angles(names, positions)
-        theta_dot = self.settings.motors.speeds(names, velocities)
+        theta_dot = self._speeds(stamp_ns, theta, self.settings.motors.speeds(names, velocities))
         if frame_id == CORRECTED_FRAME:
             self._corrector.reset()
             self._remember(stamp_ns, theta, None, theta_dot)
@@ -283,6 +284,18 @@ class CorrectionStream(Stream):
             limits = self.model.table.geometry.limits
             require_within_limits(COMMAND, theta, limits, self.settings.motors)
         return theta
+
+    def _speeds(self, stamp_ns: int, theta: Array, said: Array | None) -> Array:
+        """Return the speeds of a command (2,) [rad/s]: those it says, else the way from the last.
+
+        A correction that is tried is no part of that way: it would be driven in no time.
+        """
+        last_ns, last = self._commanded or (stamp_ns, theta)
+        self._commanded = stamp_ns, theta
+        if said is not None:
+            return said
+        passed_ns = stamp_ns - last_ns
+        return (theta - last) * (NANOSECONDS / passed_ns) if passed_ns > 0 else np.zeros(2)
 
     def _remember(
         self, stamp_ns: int, theta: Array, load: Load | None, theta_dot: Array | None

@@ -62,6 +62,18 @@ class RunningModel:
         taken._session = copy(self._session)
         return taken
 
+    def rest(self, stamp_ns: int, load_at: Callable[[Array], Load]) -> None:
+        """Let time pass up to a stamp [ns], at rest at the last motor angles, if there are any.
+
+        `load_at`: the load on the platform that is turned by (3, 3), U -> F.  What is tried from
+        there has moved in no time, so no speed and no acceleration is made of it.  Raises
+        `WristError` as `advance`.
+        """
+        session = self._session_at(stamp_ns)
+        if session is not None and session.theta is not None:
+            there = self.model.table.workspace.configuration(session.theta)
+            self.advance(stamp_ns, session.theta, load_at(there.platform), np.zeros(2))
+
     @property
     def compiled(self) -> CompiledWrist | None:
         """The compiled formulas, where they serve the model and nothing is to be remembered."""

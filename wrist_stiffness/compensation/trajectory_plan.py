@@ -118,7 +118,10 @@ AT_ONCE = 8
 
 @dataclass
 class PlanCorrector:
-    """Corrects motor angles of one plan, each for itself: neither slewed nor held by hysteresis."""
+    """Corrects motor angles of one plan, each for itself: neither slewed nor held by hysteresis.
+
+    The motors rest until it begins.  Raises `WristError` if they cannot rest where they are.
+    """
 
     running: RunningModel  # a model with its memory at the plan's start
     settings: StreamSettings
@@ -132,6 +135,7 @@ class PlanCorrector:
         self.settings = replace(self.settings, safety=safety)
         self._task, _ = Corrector().compiled_settings(self.running.model, self.settings)
         self._scales = Scales(self.running.model.table.geometry)
+        self.running.rest(self.stamp_ns, self.held.load)
 
     def work(
         self, points: Sequence[PlannedPoint], places: Sequence[int]

@@ -1,7 +1,7 @@
 """Condensed solids on disk, so that an interrupted build goes on where it was.
 
 A build keeps each part as soon as it is condensed.  The name of a file is the checksum of all that
-decides its numbers: dimensions, element sizes, interface model and solver versions.
+decides its numbers: dimensions, element sizes, interface model and versions, this program's too.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wrist_stiffness import __version__
 from wrist_stiffness.atomic_file import replacing
 from wrist_stiffness.errors import TableError
 from wrist_stiffness.fem.parts import Solid, assemble_body
@@ -87,7 +88,7 @@ class CondensedStore:
 
 
 def _key(solid: Solid, sizes: MeshSettings, interface: Interface) -> str:
-    versions = [version(package) for package in PACKAGES]
+    versions = [__version__, *(version(package) for package in PACKAGES)]
     said = repr((solid, sizes, interface, versions))
     return hashlib.sha256(said.encode()).hexdigest()[:32]
 

@@ -44,7 +44,7 @@ class Contribution:
         return Contribution(*(together(mine[name], its[name]) for name in mine))
 
     def check(self, samples: int, sectors: int) -> None:
-        """Refuse arrays of other shapes than n samples and m sectors ask for, or not finite.
+        """Refuse arrays of other shapes than n samples and m sectors ask for, or no finite numbers.
 
         Raises `InputError`: the message names the field.
         """
@@ -53,6 +53,8 @@ class Contribution:
             value, shape = getattr(self, name), shapes.get(name, (samples, 6))
             if value is not None and np.shape(value) != shape:
                 raise InputError(f"{name} has shape {np.shape(value)}, not {shape}")
+            if value is not None and not np.can_cast(np.asarray(value).dtype, float, "same_kind"):
+                raise InputError(f"{name} holds {np.asarray(value).dtype}, not real numbers")
             if value is not None and not np.isfinite(value).all():
                 raise InputError(f"{name} is not finite")
 

@@ -31,6 +31,7 @@ from wrist_stiffness.model.lineage import Step
 from wrist_stiffness.model.prediction import BlockPrediction, Prediction
 from wrist_stiffness.model.session import Session
 from wrist_stiffness.model.situation import Situation, lengths
+from wrist_stiffness.model.users_law import changed_by
 
 IN_F, IN_U = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
 
@@ -115,7 +116,7 @@ class ErrorModel:
         """Elastic parts of the table with the effects that change them."""
         parts = self.table.components
         for effect in self._of_parts:
-            parts = effect.law.changed(parts, effect.component, effect.si)
+            parts = changed_by(effect, parts)
         return parts
 
     @cached_property

@@ -13,15 +13,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import is_
-from pathlib import Path
-from traceback import extract_tb
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wrist_stiffness.errors import InputError, WristError
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.lookup.table import Table
 from wrist_stiffness.mechanism.components import Array, ElasticComponents
 from wrist_stiffness.mechanism.configuration import Configuration
@@ -41,6 +39,7 @@ from wrist_stiffness.model.memory import slope
 from wrist_stiffness.model.prediction import seen
 from wrist_stiffness.model.situation import BlockStatics, Situation, lengths
 from wrist_stiffness.model.slopes import only_constants_differ, with_constants
+from wrist_stiffness.model.users_law import advanced_by
 
 if TYPE_CHECKING:
     from wrist_stiffness.model.error_model import ErrorModel
@@ -336,7 +335,7 @@ def _advanced(
     if known is not None:
         return known
     try:
-        added, after = _advanced_by(effect, at, _near(effect, state, near))
+        added, after = advanced_by(effect, at, _near(effect, state, near))
     except MissingSignalError as missing:
         signal = str(missing)
         said = left_out(effect.name, signal)
@@ -423,32 +422,14 @@ def home_of(table: Table, parts: ElasticComponents) -> Situation:
 
 
 def constant_of(effect: Effect, home: Situation) -> Constants:
-    """Return what a constant effect adds at home."""
-    added, _ = _advanced_by(effect, home, None)
+    """Return what a constant effect adds at home (InputError where no constant can be that)."""
+    added, _ = advanced_by(effect, home, None)
+    if added.both is not None or added.through is not None:
+        raise InputError(
+            f"{effect.name}: a law with constant = True cannot move both limbs, at the frame or "
+            "the platform, or push through parts; let it be without"
+        )
     return Constants.of_home(effect.component, added, _first_order(effect, added))
-
-
-def _advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contribution, Any]:
-    """Call a law; whatever goes wrong in a user's own becomes an error that names it."""
-    if not effect.law.foreign:
-        return effect.law.advance(at, effect.component, effect.si, state)
-    try:
-        added, state = effect.law.advance(at, effect.component, effect.si, state)
-        added.check(len(at.block), len(at.parts.sectors.gap))
-    except MissingSignalError:
-        raise
-    except WristError as error:
-        raise InputError(f"{effect.name}: {error}") from error
-    except (Exception, SystemExit) as error:
-        told = f"{effect.name}: {type(error).__name__}: {error}"
-        raise InputError(told + _line_in(effect.law.file, error)) from error
-    return added, state
-
-
-def _line_in(file: Path | None, error: BaseException) -> str:
-    """Return which line of a user's own file an error came through last, empty for none."""
-    lines = [at.lineno for at in extract_tb(error.__traceback__) if Path(at.filename) == file]
-    return f" ({file.name}, line {lines[-1]})" if file is not None and lines else ""
 
 
 def _first_order(effect: Effect, added: Contribution) -> tuple[str, ...]:

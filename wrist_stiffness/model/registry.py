@@ -110,9 +110,16 @@ def law_of(found: object, place: str) -> Law:
     missing = [*getattr(found, "__abstractmethods__", ())]
     if found.parameters is Law.parameters and not hasattr(found, "own"):
         missing.append("parameters")
+    acts = ("changed",) if getattr(found, "stage", "") == "parts" else ("advance", "added")
+    if all(getattr(found, name) is getattr(Law, name) for name in (*acts, "together")):
+        missing.append(" or ".join(acts))
     if missing := [*missing, *(name for name in wanted if not hasattr(found, name))]:
         raise InputError(f"{place}: {found.__name__} does not define {', '.join(missing)}")
-    law = found()
+    try:
+        law = found()
+    except (Exception, SystemExit) as error:
+        said = f"{type(error).__name__}: {error}"
+        raise InputError(f"{place}: {found.__name__}(): {said}") from error
     require_id(law.id)
     if law.stage not in STAGES:
         raise InputError(
@@ -140,6 +147,8 @@ def _require_parameters(law: Law, place: str) -> None:
             for each in parameters:
                 if not each.scale > 0.0:
                     raise InputError(f"{each.key}: scale = {each.scale} is not above 0")
+            asked = "sentence"
+            law.sentence.format(place=component)
             asked = "linearised"
             # The first columns, and the effect with which a fit would begin.
             recipe = law.linearised(component, frozenset())

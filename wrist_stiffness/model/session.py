@@ -33,6 +33,12 @@ class Session:
         # of the model itself, and of each of its `variations`
         self._memories: Sequence[Memory | None] = [None] * (1 + len(model.variations))
 
+    @property
+    def theta(self) -> Array | None:
+        """Motor angles of the last sample that is remembered (2,) [rad]; None where none is."""
+        first = self._memories[0]
+        return None if first is None else first.theta
+
     def advance(self, sample: Sample) -> Prediction:
         """Predict one sample and remember it.
 

@@ -154,7 +154,7 @@ def replay_lines(summary: ReplaySummary) -> list[str]:
     if summary.replaced:
         lines.append(f"{summary.replaced} outputs of an earlier run in the input left out")
     for warning, count in summary.warnings.most_common():
-        lines.append(f"{count} predictions: {warning}")
+        lines.append(f"{count} predictions, the first: {warning}")
     for reason, count in summary.refused.most_common():
         lines.append(f"{count} refused, the first: {reason}")
     return lines

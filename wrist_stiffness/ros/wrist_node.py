@@ -318,6 +318,10 @@ class WristNode(GuardedNode, ABC):
 
     def _use_parameters(self, changes: list[Parameter]) -> None:
         self.stream.settings = stream_settings(values_of(self, self._entries))
+        tare = self._tare
+        if tare is not None and tare.frames != self.get_parameter("frames").value:
+            self._set_tare(None)
+            self.get_logger().warning("the tare was taken with other frames: dropped; tare again")
 
     def _loading(self) -> Loading:
         path = model_path(self.get_parameter("model_file").value)
