@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from measured_wrist import wrong_wrist
+from measured_wrist import problem_of_a_wrist_that_misses_something, wrong_wrist
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.extend import direction_of
@@ -14,7 +14,6 @@ from wrist_stiffness.identification.extension import extend
 from wrist_stiffness.identification.proposal import Proposals, twins
 from wrist_stiffness.identification.proposing import propose
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
-from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference import search
 from wrist_stiffness.model.effect import Effect, effect_at
@@ -59,13 +58,9 @@ def planted(model, session, place, direction, text, *others, **sizes):
 
 
 def proposed(model, session, most=1):
-    """A second law takes longer, and changes nothing of the first.
-
-    So does looking for a valley that leads to the noise: beside a planted law none does.
-    """
+    """A second law takes longer, and changes nothing of the first."""
+    problem = problem_of_a_wrist_that_misses_something(model, as_units(model, session))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(WristFit, "rough", False)
-        problem = WristProblem(model, (as_units(model, session),))
         patch.setattr(proposing, "MOST_TERMS", most)
         return propose(problem, problem.begin())
 
