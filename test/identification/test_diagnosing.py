@@ -127,7 +127,8 @@ def test_play_and_lost_motion_together_are_both_named(model, in_the_cell):
     """The first one found takes most of the error or most of the evidence; the search goes on."""
     play = HiddenEffect("joint_clearance", "joint_3", "algebraic", 8e-7, 5)
     lost = replace(BACKLASH, magnitude=1.2e-3)
-    found = diagnose_sessions(model, [measured(in_the_cell, model, (play, lost))]).diagnosis
+    session = measured(in_the_cell, model, (play, lost), seconds=60.0)
+    found = diagnose_sessions(model, [session]).diagnosis
     names = {each.name for each in found.findings}
     assert names == {"joint_clearance@joint_3", "backlash@motor_1"}
 
