@@ -14,6 +14,9 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
 ROS_DOMAIN_ID ?= $(shell echo $$(( $$$$ % 90 + 1 )))
 export ROS_DOMAIN_ID
 
+# Containers set it: then each of a hundred nodes and commands of the tests compiles all modules.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help demo test lint docs bench tables clean
 
 help:

@@ -1,8 +1,10 @@
+import gc
 import os
 import sys
 from pathlib import Path
 
 import hypothesis
+import pytest
 
 # Before anything loads numpy.  Workers share the cores: threads of their own below them wait for
 # each other: on a busy machine a test of half a second was not done after a minute.
@@ -25,6 +27,16 @@ pytest_plugins = ["measured_wrist"]
 # On a busy machine any example can take long.
 hypothesis.settings.register_profile("any machine", deadline=None)
 hypothesis.settings.load_profile("any machine")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Set aside what is loaded: after each test with live nodes the collector would look at it."""
+    gc.disable()
+    found = yield
+    gc.freeze()
+    gc.enable()
+    return found
 
 
 def pytest_collection_modifyitems(items):

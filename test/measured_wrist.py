@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from wrist_stiffness.identification.wrist_fit import WristFit
+from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.lookup.table_file import load_table
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
@@ -162,6 +164,16 @@ def table():
 @pytest.fixture(scope="session")
 def model():
     return load_model(shipped_file("config/palmieri2015_model.yaml"))
+
+
+def problem_of_a_wrist_that_misses_something(model, *units):
+    """Return the problem as `WristProblem` would, without asking whether a valley leads to noise.
+
+    None does, and what that search finds is thrown away.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(WristFit, "rough", False)
+        return WristProblem(model, units)
 
 
 def wrong_wrist(seconds, program_seed, base_seed, rate_hz=10.0, **more):

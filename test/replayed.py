@@ -26,6 +26,17 @@ def write(path, timeline):
     return path
 
 
+def first_seconds(source, seconds, target):
+    """Write the beginning of a recording."""
+    messages = list(open_recording(source).raw_messages())
+    end_ns = messages[0].log_time_ns + 1e9 * seconds
+    with RecordingWriter(target) as writer:
+        for each in messages:
+            if each.log_time_ns < end_ns:
+                writer.write_raw(each.channel, each.payload, each.log_time_ns)
+    return target
+
+
 def outputs(path, topic):
     return [message for _, _, message in open_recording(path).messages([topic])]
 

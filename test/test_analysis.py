@@ -25,9 +25,8 @@ pytestmark = pytest.mark.slow
 PLAY = "backlash@motor_2"
 
 
-@pytest.fixture(scope="module")
-def sessions(model):
-    """Two days of a wrist with play in a gear."""
+def two_days(model, *hidden):
+    """Sessions of a wrist that hides something."""
     found = []
     for day in (0, 1):
         settings = CellSettings(
@@ -37,7 +36,7 @@ def sessions(model):
             base="wrong",
             base_seed=3,
             session=day,
-            hidden=(HiddenEffect("backlash", "motor_2", "single", np.radians(0.06), 5),),
+            hidden=hidden,
         )
         cell = VirtualCell(model.table, settings, np.random.default_rng(day))
         time = np.arange(600) / 10.0
@@ -50,11 +49,18 @@ def sessions(model):
 
 
 @pytest.fixture(scope="module")
-def given(model, sessions):
-    """It is only asked; on the first day the tracker is away for ten seconds."""
-    time = sessions[0].block.time - sessions[0].block.time[0]
-    first = sessions[0].take((time < 20.0) | (time > 30.0))
-    return Analysis(model, {"first": first, "second": sessions[1]})
+def sessions(model):
+    """Two days of a wrist with play in a gear."""
+    return two_days(model, HiddenEffect("backlash", "motor_2", "single", np.radians(0.06), 5))
+
+
+@pytest.fixture(scope="module")
+def given(model):
+    """A sound wrist that is only asked; on the first day the tracker is away for ten seconds."""
+    first, second = two_days(model)
+    time = first.block.time - first.block.time[0]
+    away = first.take((time < 20.0) | (time > 30.0))
+    return Analysis(model, {"first": away, "second": second})
 
 
 @pytest.fixture
@@ -117,21 +123,22 @@ def test_the_error_falls_with_what_is_added(model, sessions, fitted):
 
 
 def test_what_is_asked_of_one_recording_begins_with_the_fit_that_is_known(
-    model, sessions, monkeypatch
+    model, given, monkeypatch
 ):
-    analysis = Analysis(model, sessions[:1])
+    analysis = Analysis(model, given.sessions[:1])
     monkeypatch.setattr(diagnosis_module, "WristProblem", None)
     assert analysis.rank(seconds=1e-3).diagnosis.ended == TIME_OVER
 
 
-def test_contents_say_what_a_recording_holds(given, sessions):
+def test_contents_say_what_a_recording_holds(given):
     first, second = given.contents()
     assert (first.name, second.name) == ("day_0", "day_1")
     assert (first.measured, second.measured) == (499, 600)
     assert first.duration_s == pytest.approx(59.9)
     assert second.rate_hz == pytest.approx(10.0, rel=0.01)
     assert 5 < first.dwells < 100
-    lowest, highest = sessions[0].block.theta[:, 1].min(), sessions[0].block.theta[:, 1].max()
+    theta = given.sessions[0].block.theta[:, 1]
+    lowest, highest = theta.min(), theta.max()
     assert first.angles[1].tolist() == [lowest, highest]
     assert 0.0 <= first.speed[0] < first.speed[1] < 5.0
     assert first.force[1] > 0.5

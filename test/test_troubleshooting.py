@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -39,15 +40,19 @@ def rendered(node):
     return "".join(parts)
 
 
-CODE = set().union(
-    *(messages_in(path.read_text()) for path in (ROOT / "wrist_stiffness").rglob("*.py"))
-)
+@cache
+def code():
+    """Return all texts of the package: not while tests are collected, in every process."""
+    files = (ROOT / "wrist_stiffness").rglob("*.py")
+    return set().union(*(messages_in(path.read_text()) for path in files))
+
+
 EXPLAINED = explained_on(PAGE)
 
 
 @pytest.mark.parametrize("message", EXPLAINED)
 def test_explained_message_is_in_the_code(message):
-    assert any(message in text for text in CODE)
+    assert any(message in text for text in code())
 
 
 def test_the_page_is_read_as_it_looks():

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from replayed import first_seconds
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.commands.fleet import Answer
@@ -146,7 +147,8 @@ def test_the_same_recording_gives_the_same_answer(compared, with_backlash, tmp_p
 def test_to_which_of_the_recordings_a_model_was_fitted_is_said(with_backlash, tmp_path, capsys):
     from wrist_stiffness.commands.read_sessions import recording_sha256
 
-    days = [DATA / f"wrist_{each}.mcap" for each in "abc"]
+    names = [f"wrist_{each}.mcap" for each in "abc"]
+    days = [first_seconds(DATA / name, 15.0, tmp_path / name) for name in names]
     shas = ", ".join(f"{each.stem}: '{recording_sha256(each)}'" for each in days[:2])
     lineage = (
         "lineage:\n  - {command: extend, date: '2026-01-01', "

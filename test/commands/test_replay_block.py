@@ -195,8 +195,8 @@ TOPICS = (
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "follow", "step_ns"),
-    # A model with a memory goes sample by sample in a replay as well: a quarter of them will do.
-    [(False, False, STEP_NS), (False, True, STEP_NS), (True, False, 4 * STEP_NS)],
+    # A model with a memory goes sample by sample in a replay as well: an eighth of them will do.
+    [(False, False, STEP_NS), (False, True, STEP_NS), (True, False, 8 * STEP_NS)],
     ids=["supervised", "every load followed", "effects with a memory"],
 )
 def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, monkeypatch, effects, follow, step_ns):
@@ -211,7 +211,7 @@ def test_a_replay_is_what_nodes_send_to_the_bit(tmp_path, monkeypatch, effects, 
     if step_ns > STEP_NS:
         # Fewer messages at a time too, or all would go by themselves with the clock that jumps.
         monkeypatch.setattr(Recording.blocks, "__defaults__", (None, 1))
-        monkeypatch.setattr(chunk_writer, "CHUNK_BYTES", chunk_writer.CHUNK_BYTES // 2)
+        monkeypatch.setattr(chunk_writer, "CHUNK_BYTES", chunk_writer.CHUNK_BYTES // 4)
     if effects:
         model = tmp_path / "effects.yaml"
         model.write_text(EFFECTS.format(table=shipped_file("precomputed/palmieri2015.npz")))

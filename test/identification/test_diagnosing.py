@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured_wrist import wrong_wrist
+from measured_wrist import problem_of_a_wrist_that_misses_something, wrong_wrist
 
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
@@ -127,7 +127,8 @@ def test_play_and_lost_motion_together_are_both_named(model, in_the_cell):
     """The first one found takes most of the error or most of the evidence; the search goes on."""
     play = HiddenEffect("joint_clearance", "joint_3", "algebraic", 8e-7, 5)
     lost = replace(BACKLASH, magnitude=1.2e-3)
-    found = diagnose_sessions(model, [measured(in_the_cell, model, (play, lost))]).diagnosis
+    session = measured(in_the_cell, model, (play, lost), seconds=60.0)
+    found = diagnose_sessions(model, [session]).diagnosis
     names = {each.name for each in found.findings}
     assert names == {"joint_clearance@joint_3", "backlash@motor_1"}
 
@@ -258,7 +259,7 @@ def test_a_drive_that_is_stiffer_than_stiff_is_not_asked(model, in_the_cell, sig
     change = np.zeros((len(units), 6))
     change[units.measured] = about.about(about.begin()).changes([soft])[0]
     moved = replace(units, values=units.values + sign * change)
-    problem = WristProblem(model, (moved,))
+    problem = problem_of_a_wrist_that_misses_something(model, moved)
     fit = problem.begin()
     (trial,) = (each for each in problem.trials(fit) if each.name == name)
     (first,) = ranked(fit.evidence.without_discrepancy(), [trial])
@@ -287,7 +288,7 @@ def test_a_quick_fit_tells_what_slopes_cannot(model, in_the_cell):
     """Flanges close under a weight: about the wrist without it the slopes say far too little."""
     hidden = HiddenEffect("gravity", "platform", "mass", 0.17, 5)
     units = as_units(model, measured(in_the_cell, model, (hidden,)))
-    problem = WristProblem(model, (units,))
+    problem = problem_of_a_wrist_that_misses_something(model, units)
     fit = problem.begin()
     (trial,) = (each for each in problem.trials(fit) if each.name == "gravity@platform")
     (first,) = ranked(fit.evidence, [trial])

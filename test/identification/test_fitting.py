@@ -315,7 +315,6 @@ def test_what_makes_another_day_worse_is_not_handed_over(model):
     quiet = replace(found, refused=found.fit.noise)
     assert "Both are about noise and drift" in quiet.warnings[0]
     assert Calibrated(found, tuple(days), "").as_values()["warnings"] == list(found.warnings)
-    assert not calibrate(model, [days[1], replace(days[1], name="again")]).refused
 
 
 def test_parameters_that_are_told_together_only_name_each_other(model):

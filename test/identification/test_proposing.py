@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from measured_wrist import wrong_wrist
+from measured_wrist import problem_of_a_wrist_that_misses_something, wrong_wrist
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.commands.extend import direction_of
@@ -59,7 +59,7 @@ def planted(model, session, place, direction, text, *others, **sizes):
 
 def proposed(model, session, most=1):
     """A second law takes longer, and changes nothing of the first."""
-    problem = WristProblem(model, (as_units(model, session),))
+    problem = problem_of_a_wrist_that_misses_something(model, as_units(model, session))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(proposing, "MOST_TERMS", most)
         return propose(problem, problem.begin())

@@ -241,7 +241,7 @@ def payloads(path, topic):
 
 def test_live_and_replayed_predictions_are_equal_to_the_bit(tmp_path, model_path):
     live, replayed = tmp_path / "live", tmp_path / "replayed"
-    assert cell.run_cell(seconds=3.0, record=live, rate_hz=50.0)
+    assert cell.run_cell(seconds=2.0, record=live, rate_hz=50.0)
     counts = {topic.name: topic.count for topic in open_recording(live).topics}
     assert counts["/joint_states"] > 100
     for topic in (

@@ -11,8 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-
-from wrist_stiffness.recording import RecordingWriter, open_recording
+from replayed import first_seconds
 
 TUTORIAL = Path(__file__).parents[1] / "data" / "tutorial"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -21,15 +20,6 @@ PICTURES = "WRIST_WORKBENCH_PICTURES"
 
 DAYS_S = {"monday": 90.0, "wednesday": 120.0}
 """How much of the tutorial's days [s]: enough to show the same."""
-
-
-def first_seconds(source, seconds, target):
-    messages = list(open_recording(source).raw_messages())
-    end_ns = messages[0].log_time_ns + 1e9 * seconds
-    with RecordingWriter(target) as writer:
-        for each in messages:
-            if each.log_time_ns < end_ns:
-                writer.write_raw(each.channel, each.payload, each.log_time_ns)
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,7 @@ class Example:
     hidden: str  # `law@component:form`
     size: float  # in units of one sample's noise
     days: int = 2  # recordings; the last one judges
-    seconds: float = 120.0  # duration of each [s]
+    seconds: float = 90.0  # duration of each [s]
     instrument: str = "interferometer"  # pose sensor
 
 
@@ -34,6 +34,7 @@ EXAMPLES = (
         "Two days of a wrist that turns by some hundredths of a degree too little or too much.",
         "backlash@motor_2:single",
         4.0,
+        seconds=60.0,
     ),
     Example(
         "unknown_fault",
@@ -41,7 +42,6 @@ EXAMPLES = (
         "Two days of a wrist that errs in a few poses, as no effect of the catalogue would.",
         "dent@joint_3",
         4.0,
-        seconds=90.0,
     ),
     Example(
         "cannot_tell",
