@@ -18,6 +18,7 @@ from wrist_stiffness.model.formula import names_in
 from wrist_stiffness.model.formula_law import LOAD_SENSOR, SIGNALS, TOOL, FormulaLaw, words_of
 from wrist_stiffness.model.parameters import Estimate, si_factor
 from wrist_stiffness.model.places import BODY, LIMB
+from wrist_stiffness.numerals import number, plus_minus
 
 SAME: dict[str, tuple[str, ...]] = {
     "frame": ("the stand of the instrument",),
@@ -126,14 +127,11 @@ class Proposal:
         other, turns = BESIDE[self.key], self.key in TURNING
         parts = (row[3:], row[:3]) if turns else (row[:3], row[3:])
         length, beside = (float(np.linalg.norm(part)) for part in parts)
-        value, sigma = self.value * length, self.sigma * length
-        digits = max(0, 1 - int(np.floor(np.log10(max(sigma, 1e-9)))))
-        screw = (
-            f"{value:.{digits}f} +- {sigma:.{digits}f} {_unit(self.key)} {_words(row, self.key)}"
-        )
+        size = plus_minus(self.value * length, self.sigma * length)
+        screw = f"{size} {_unit(self.key)} {_words(row, self.key)}"
         if beside:
             more = self.value * si_factor(self.key) / si_factor(other) * beside
-            screw += f" and {more:.3g} {_unit(other)} {_words(row, other)}"
+            screw += f" and {number(more)} {_unit(other)} {_words(row, other)}"
         return screw
 
     def effect(self, name: str = "proposed") -> Effect:
@@ -241,13 +239,13 @@ class Proposals:
         before = re.fullmatch(r"proposed_(\d+)", Path(model).stem)
         first = int(before[1]) + 1 if before else 1
         out = []
-        for number, each in enumerate(self.terms, first):
-            name = f"proposed_{number}"
-            out.append(f"{'Proposed law' if number == first else 'And'}: {each.sentence}.")
-            of = "what the first leaves above it" if number > first else "the error above the noise"
-            sure = f"{_percent(each.probability)} sure{' of both' if number > first else ''}"
+        for count, each in enumerate(self.terms, first):
+            name = f"proposed_{count}"
+            out.append(f"{'Proposed law' if count == first else 'And'}: {each.sentence}.")
+            of = "what the first leaves above it" if count > first else "the error above the noise"
+            sure = f"{_percent(each.probability)} sure{' of both' if count > first else ''}"
             out.append(f"   explains {100.0 * each.explains:.0f} % of {of}; {sure}")
-            for place, effect in enumerate(named if number == first else (), 1):
+            for place, effect in enumerate(named if count == first else (), 1):
                 target = f"found_{place}.yaml"
                 words = ["extend", model, "--effect", effect, "--fit", *recordings, "-o", target]
                 out.append(f"   {shlex.join(['wrist-stiffness', *words])}")
