@@ -99,7 +99,6 @@ def test_a_tighter_tolerance_costs_less_and_none_costs_nothing(study):
     assert "bushing_stiffness@joint_1 flexibility_percent" not in found
 
 
-@pytest.mark.slow
 def test_a_wrist_keeps_what_the_model_knows_of_it():
     """Where a tolerance is left out, a calibrated value of its parameter stays what it is."""
     known = Effect(
@@ -126,6 +125,7 @@ def test_a_wrist_without_flanges_has_nothing_to_shim():
     assert {effect.name for effect in wrist} == {f"{each.law}@{each.place}" for each in drawn}
 
 
+@pytest.mark.slow
 def test_two_processes_build_the_same_wrists(study):
     assert study_tolerances(MODEL, WRISTS, LOAD, {}, workers=2) == study
 

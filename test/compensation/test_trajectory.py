@@ -150,20 +150,26 @@ def test_a_correction_that_is_tried_is_no_motion_either(model, rate_hz):
 
 
 def test_a_command_without_speeds_has_those_of_the_way_from_the_last(model):
+    """Where no time passes, or there is no stamp, it moves on as before: it does not stop."""
     turn = FormulaLaw("own", "platform", np.eye(6)[3], "1e-3 * theta_dot_1 * k", [], ["k"])
-    moving = model.with_effects(Effect(turn, "platform", {}))
+    mass = effect_at(find_law("inertia"), "platform", {"mass_g": 30.0, "z_mm": -30.0})
+    moving = model.with_effects(mass, Effect(turn, "platform", {}))
+    stamps = [101, 102, 102, 104, None, 106, 106, 106, 107, 103]
+    speeds = [0.0, *[0.5] * 8, 0.0]
     sent = []
     for said in (lambda speed: (), lambda speed: (speed, 0.0)):
         stream = CorrectionStream(moving, EVERY_LOAD, enabled=True)
-        stamps = SECOND + np.array([0, 1, 1, 3, 4, 2]) * SECOND // 100
-        angles = 0.1 + 0.01 * np.arange(6)
-        steps, passed = np.diff(angles, prepend=angles[0]), np.diff(stamps, prepend=SECOND)
-        for stamp_ns, angle, step, ns in zip(stamps.tolist(), angles, steps, passed, strict=True):
+        for number, (stamp, speed) in enumerate(zip(stamps, speeds, strict=True)):
+            at = stamp or 105
+            angle = 0.1 + 0.005 * (at - 101)
+            stamp_ns = at * SECOND // 100
             stream.loads.add(stamp_ns, "wrist_base", (0.0, 0.0, -3.0), (0.0, 0.0, 0.0))
-            speed = float(step * (SECOND / ns)) if ns > 0 else 0.0
-            done = stream.on_command(stamp_ns, "", NAMES[::-2], (float(angle), 0.3), said(speed))
-            sent.append(done.positions.tolist())
-    assert sent[:6] == sent[6:]
+            done = stream.on_command(
+                stamp_ns if stamp else 0, "", NAMES[::-2], (angle, 0.3), said(speed), stamp_ns
+            )
+            assert (done.fault is None) == (number not in (4, 9))
+            sent.append(done.positions)
+    assert np.allclose(sent[:10], sent[10:], rtol=0.0, atol=1e-9)
 
 
 BAD = {

@@ -410,6 +410,23 @@ def test_where_every_row_has_a_zero_of_its_own_nothing_could_have_shown(rng):
     assert diagnose(units, (slope,)).not_excited == ()
 
 
+def test_what_is_told_as_missing_is_not_told_as_hidden_too(rng):
+    """A large effect shows where its typical size would not: so do those that look like it."""
+    x = rng.normal(size=60)
+    units = Observations(x[:, None] + 0.1 * rng.normal(size=(60, 1)), {"x": x}, 0.01 * np.eye(1))
+    slope, other, flat = (
+        Candidate(name, "part", (Parameter("k", plausible=0.01),), law)
+        for name, law in (
+            ("slope", lambda o, s: o.covariates["x"][:, None, None]),
+            ("other", lambda o, s: o.covariates["x"][:, None, None]),
+            ("flat", lambda o, s: np.sign(o.covariates["x"])[:, None, None]),
+        )
+    )
+    found = diagnose(units, (slope, other, flat))
+    assert named(found) == {"slope@part", "other@part"}
+    assert [each.effect for each in found.not_excited] == ["flat"]
+
+
 def test_what_is_not_excited_is_listed_with_what_to_record(rng):
     units = table(rng, 120)
     units = replace(units, covariates={**units.covariates, "load": np.zeros(120)})

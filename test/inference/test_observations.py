@@ -81,7 +81,7 @@ def test_units_know_their_row_through_several_choices(table):
     [
         ({"plausible": 0.0}, "size_um: plausible is 0, must be finite and above 0"),
         ({"scale": np.nan}, "size_um: scale is nan, must be finite and above 0"),
-        ({"lower": 2.0, "upper": 1.0}, "size_um: lower is 2, upper is 1"),
+        ({"lower": 2.0, "upper": 1.0}, "size_um: lower is 2, upper is 1: lower must be smaller"),
     ],
 )
 def test_a_parameter_that_no_prior_can_hold_is_refused(change, message):

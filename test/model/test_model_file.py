@@ -306,6 +306,7 @@ LINEARISED = """def linearised(self, place, signals):
             "the state of Twist, a friction, cannot be a guess",
         ),
         (OWN.replace("def advance", "def advanse"), "Twist does not define advance or added"),
+        (OWN.replace("def advance", "def together"), "Twist does not define advance or added"),
         (OWN.replace('"geometry"', '"parts"'), "Twist does not define changed"),
         (
             OWN.replace("    stage =", "    def __init__(self, size): ...\n    stage ="),

@@ -84,6 +84,63 @@ def test_a_law_that_writes_into_what_it_is_told_is_refused(model, what, named):
         assert (block.load == 0.05).all()
 
 
+@pytest.mark.parametrize(
+    "what", ["at.contact_force", "at.through", "at.through_place('joint_1')", "at.jacobian"]
+)
+def test_a_law_that_writes_into_what_follows_from_that_is_refused(model, what):
+    class Writes(Own):
+        stage = "reaction"
+
+        def added(self, at, place, values):
+            assert at.through.any()
+            told = eval(what, {"at": at})
+            told *= 2.0
+            return self.turned(at, place, values["turn_mdeg"])
+
+    with pytest.raises(InputError, match="own@platform: ValueError: .* read-only"):
+        with_own(model, Writes()).predict(np.array([0.3, -0.2]), Load(0.05 * np.ones(6)))
+
+
+def test_a_covariate_named_as_the_angles_does_not_hide_them(model):
+    class Writes(Own):
+        def added(self, at, place, values):
+            at.block.theta[:] = 0.0
+            return self.turned(at, place, values["turn_mdeg"])
+
+    theta = np.array([0.3, -0.2])
+    sample = Sample(0.0, theta, Load(np.zeros(6)), covariates={"theta": 1.0})
+    with pytest.raises(InputError, match="writes into at.block.theta"):
+        with_own(model, Writes()).session().advance(sample)
+    assert theta.tolist() == [0.3, -0.2]
+
+
+def test_a_law_may_write_into_the_parts_it_gets(model):
+    """They are its own: the table stays as it is, and every model begins from there."""
+
+    class Softens(Own):
+        stage = "parts"
+
+        def changed(self, parts, place, values):
+            parts.flexibility[...] *= 2.0
+            for flange in parts.contact.values():
+                flange.gap[...] += 1e-3
+            return parts
+
+    class Purely(Softens):
+        def changed(self, parts, place, values):
+            contact = {j: replace(each, gap=each.gap + 1e-3) for j, each in parts.contact.items()}
+            return replace(parts, flexibility=2.0 * parts.flexibility, contact=contact)
+
+    def twist(law):
+        one = with_own(model, law) if law else model
+        return one.predict(np.array([0.3, -0.2]), Load(0.05 * np.ones(6))).twist.tolist()
+
+    first = twist(None)
+    changed = [twist(law) for law in (Softens(), Softens(), Purely())]
+    assert changed[0] == changed[1] == changed[2] != first
+    assert twist(None) == first
+
+
 def test_a_law_that_writes_into_the_angles_moves_no_motor(model):
     class Writes(Own):
         def added(self, at, place, values):

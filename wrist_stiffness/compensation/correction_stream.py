@@ -62,7 +62,8 @@ class CorrectionStream(Stream):
         self.active = True
         self._corrector = Corrector()
         self._enabled = enabled
-        self._commanded: tuple[int, Array] | None = None  # last stamp [ns] and angles
+        # last stamp [ns], with the angles and speeds that were commanded first at it
+        self._commanded: tuple[int, Array, Array] | None = None
 
     def _used(self, model: ErrorModel) -> ErrorModel:
         """Leave out what is wrong with a measurement alone: commands are no measurement."""
@@ -288,14 +289,19 @@ class CorrectionStream(Stream):
     def _speeds(self, stamp_ns: int, theta: Array, said: Array | None) -> Array:
         """Return the speeds of a command (2,) [rad/s]: those it says, else the way from the last.
 
-        A correction that is tried is no part of that way: it would be driven in no time.
+        A correction that is tried is no part of that way: it would be driven in no time.  Where no
+        time passed, as before: a clock may stand still, and a command may come twice.
         """
-        last_ns, last = self._commanded or (stamp_ns, theta)
-        self._commanded = stamp_ns, theta
+        last_ns, last, speed = self._commanded or (stamp_ns, theta, np.zeros(2))
+        passed_ns = stamp_ns - last_ns if stamp_ns else 0
+        if passed_ns:
+            way = theta - last
+            speed = way * (NANOSECONDS / passed_ns) if passed_ns > 0 else np.zeros(2)
         if said is not None:
-            return said
-        passed_ns = stamp_ns - last_ns
-        return (theta - last) * (NANOSECONDS / passed_ns) if passed_ns > 0 else np.zeros(2)
+            speed = said
+        if passed_ns or self._commanded is None:
+            self._commanded = stamp_ns, theta, speed
+        return speed
 
     def _remember(
         self, stamp_ns: int, theta: Array, load: Load | None, theta_dot: Array | None

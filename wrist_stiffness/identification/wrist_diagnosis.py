@@ -156,7 +156,7 @@ def diagnose_sessions(
         reading.depends_on,
         reading.unexplained,
         standings(search, reading),
-        _not_excited(search),
+        _not_excited(search, reading),
         tuple(each.sentence for each in absorbed),
         judge.scope,
         ended=search.ended,
@@ -305,8 +305,8 @@ def _values(state: State, name: str, effect: Effect) -> dict[str, tuple[float, f
     }
 
 
-def _not_excited(search: Search) -> tuple[NotExcited, ...]:
-    found = [_law_and_place(name) for name in not_shown(search)]
+def _not_excited(search: Search, reading: Reading) -> tuple[NotExcited, ...]:
+    found = [_law_and_place(name) for name in not_shown(search, reading)]
     return tuple(
         NotExcited(law, place, catalogue()[law].excited_by)
         for law, place in found

@@ -49,7 +49,8 @@ class Parameter:
             if size is not None and not 0.0 < size < np.inf:
                 raise InputError(f"{self.name}: {key} is {size:g}, must be finite and above 0")
         if not self.lower < self.upper:
-            raise InputError(f"{self.name}: lower is {self.lower:g}, upper is {self.upper:g}")
+            bounds = f"lower is {self.lower:g}, upper is {self.upper:g}"
+            raise InputError(f"{self.name}: {bounds}: lower must be smaller")
 
 
 @dataclass(frozen=True)

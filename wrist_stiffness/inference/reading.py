@@ -235,12 +235,13 @@ def _depends_on(state: State) -> dict[str, float]:
     return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
 
-def not_shown(search: Search) -> list[str]:
-    """Return the candidates of which a typical size would not show."""
+def not_shown(search: Search, reading: Reading) -> list[str]:
+    """Return the candidates of which a typical size would not show, but for those that are told."""
+    told = {name for each in reading.classes for name in each.members}
     return [
         name
         for name, strength in search.strength.items()
-        if name not in search.best.names and strength < DETECTABLE
+        if name not in told and strength < DETECTABLE
     ]
 
 

@@ -22,6 +22,7 @@ from wrist_stiffness.inference.predictor import LEAST, PredictedSet, Predictor, 
 from wrist_stiffness.inference.reading import (
     NAMING,
     Class,
+    Reading,
     not_shown,
     probabilities,
     read,
@@ -150,7 +151,7 @@ def diagnose(
         reading.depends_on,
         reading.unexplained,
         standings(search, reading),
-        _not_excited(problem, search),
+        _not_excited(problem, search, reading),
         scope="another session" if aside.any() else "a part of this session",
         ended=search.ended,
         noise_known=reading.state.evidence.background.noise_known,
@@ -293,12 +294,14 @@ def _values(state: State, name: str) -> dict[str, tuple[float, float]]:
     return found
 
 
-def _not_excited(problem: LinearProblem, search: Search) -> tuple[NotExcited, ...]:
+def _not_excited(
+    problem: LinearProblem, search: Search, reading: Reading
+) -> tuple[NotExcited, ...]:
     """Return the candidates of which a plausible size would not show."""
     laws = problem.laws
     return tuple(
         NotExcited(laws[name].effect, laws[name].component, laws[name].needs)
-        for name in not_shown(search)
+        for name in not_shown(search, reading)
     )
 
 

@@ -111,7 +111,7 @@ def law_of(found: object, place: str) -> Law:
     if found.parameters is Law.parameters and not hasattr(found, "own"):
         missing.append("parameters")
     acts = ("changed",) if getattr(found, "stage", "") == "parts" else ("advance", "added")
-    if all(getattr(found, name) is getattr(Law, name) for name in (*acts, "together")):
+    if all(getattr(found, name) is getattr(Law, name) for name in acts):
         missing.append(" or ".join(acts))
     if missing := [*missing, *(name for name in wanted if not hasattr(found, name))]:
         raise InputError(f"{place}: {found.__name__} does not define {', '.join(missing)}")

@@ -186,7 +186,7 @@ class Situation:
     @property
     def jacobian(self) -> Array:
         """Jacobian of the platform's angular velocity, (n, 3, 2)."""
-        return self.statics.jacobian
+        return _held(self.statics.jacobian)
 
     @cached_property
     def acting(self) -> Contribution:
@@ -285,7 +285,7 @@ class Situation:
     @property
     def contact_force(self) -> Array:
         """Force of the flange sectors under all that earlier stages added, (n, m) [N]."""
-        return self.contact[0]
+        return _held(self.contact[0])
 
     def with_more(self, added: Contribution) -> Situation:
         """Return the situation after a further stage that added this, with what is known of it."""
@@ -311,7 +311,8 @@ class Situation:
         through = self.statics.own_weight + component_wrenches(
             self.influence, self.parts, self.wrench, self.contact_force
         )
-        return through if self.acting.through is None else through + self.acting.through
+        added = self.acting.through
+        return _held(through if added is None else through + added)
 
     def through_place(self, place: str) -> Array:
         """Return the wrench through a joint, link, motor, the frame or the platform, (n, 6).
@@ -427,6 +428,13 @@ class Situation:
         if name not in self.block.covariates:
             raise MissingSignalError(f"covariate {name}")
         return self.block.covariates[name]
+
+
+def _held(known: Array) -> Array:
+    """Return a view into which no law can write what others read."""
+    view = known.view()
+    view.flags.writeable = False
+    return view
 
 
 def _difference(first: Array | None, second: Array | None) -> Array | None:

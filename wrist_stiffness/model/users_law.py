@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from traceback import extract_tb
 from typing import Any
@@ -46,11 +47,15 @@ def advanced_by(effect: Effect, at: Situation, state: Any) -> tuple[Contribution
 
 
 def changed_by(effect: Effect, parts: ElasticComponents) -> ElasticComponents:
-    """Return the elastic parts with what a law of the stage `parts` changes (errors as above)."""
+    """Return the elastic parts with what a law of the stage `parts` changes (errors as above).
+
+    A user's own law may write into what it gets: it is a copy, else the table would change.
+    """
     if not effect.law.foreign:
         return effect.law.changed(parts, effect.component, effect.si)
     with _naming(effect):
-        changed: Any = effect.law.changed(parts, effect.component, dict(effect.si))
+        own = deepcopy(replace(parts))  # without what is known of the parts as they were
+        changed: Any = effect.law.changed(own, effect.component, dict(effect.si))
         if not isinstance(changed, ElasticComponents):
             raise InputError(f"changed gives a {type(changed).__name__}, not ElasticComponents")
     return changed
@@ -73,7 +78,7 @@ def _naming(effect: Effect) -> Iterator[None]:
 def _told(at: Situation) -> dict[str, Array]:
     """Return the arrays that a law is told, by the names that it has for them."""
     parts = {
-        "at.block.": {**vars(at.block), **at.block.temperatures, **at.block.covariates},
+        "at.block.": {**at.block.temperatures, **at.block.covariates, **vars(at.block)},
         "at.configuration.": vars(at.configuration),
         "at.": {"load": at.load},
     }
