@@ -90,7 +90,7 @@ def scores(case: Case, result: Diagnosis) -> dict[str, float]:
     named = [set(finding.names) for finding in result.findings]
     silent = {f"{each.effect}@{each.component}" for each in result.not_excited}
     score: dict[str, float] = {
-        "none": result.verdict == "none",
+        "none": result.verdict in ("none", "undecided"),
         "unknown": result.verdict == "unknown",
         "spurious": sum(not (members & truths) for members in named),
     }
