@@ -30,6 +30,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 import blind_strangers
+import fourth_strangers
 import newer_strangers
 from bench_wrist import Array, wrist
 from cases import Case, one_each
@@ -59,6 +60,7 @@ STRETCHES = 12
 BLIND = {
     "by another author": blind_strangers.BLIND,
     "by a third author": newer_strangers.NEWER,
+    "by a fourth author": fourth_strangers.FOURTH,
 }
 """Strangers whose authors had not seen how laws are proposed; each list was asked once first."""
 
@@ -67,7 +69,7 @@ def cases(sizes: Sequence[float], sound: int) -> list[Case]:
     """Return strangers at one place each, sound wrists, and strangers by other authors."""
     found = [Case((place,), size) for place in one_each(STRANGERS) for size in sizes]
     found += [Case((), 0.0)] * sound
-    for others in (blind_strangers, newer_strangers):
+    for others in (blind_strangers, newer_strangers, fourth_strangers):
         others.register()
     found += [
         Case((place,), size) for own in BLIND.values() for place in one_each(own) for size in sizes
