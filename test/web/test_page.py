@@ -264,7 +264,7 @@ def test_the_keyboard_alone_opens_asks_and_cancels_and_tabs_are_apart(address, b
     hand.press("Enter")
     hand.tabs_to("What is missing?")
     hand.press("Enter")
-    hand.page.wait_for_selector("text=asking which effect is missing")
+    hand.page.wait_for_selector("text=missing so far")
     hand.press("Escape")
     hand.page.wait_for_selector("text=Cancelled. Nothing was changed.")
     assert hand.held_out("φ") == remaining
