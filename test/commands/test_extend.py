@@ -278,6 +278,20 @@ def test_hidden_backlash_is_extended_and_the_nodes_code_uses_it(tmp_path, capsys
     assert summary.predictions == summary.joint_states > 0
 
 
+@pytest.mark.slow
+def test_a_pin_that_rests_elsewhere_does_not_speak_against_its_play(tmp_path, capsys):
+    """From the nominal model the part that was seen led to other flanges; `diagnose` named it."""
+    day, output, report = (tmp_path / name for name in ("day.mcap", "worn.yaml", "worn.json"))
+    play = ["--effect", "joint_clearance@joint_3"]
+    assert main(["simulate", "-o", str(day), "--seed", "7", "--base", "wrong", *play]) == 0
+    fit = ["--fit", str(day), "-o", str(output), "--json", str(report)]
+    assert main(["extend", *play, *fit]) == 0
+    told = json.loads(report.read_text())
+    for key in ("s_um", "phi_mdeg"):
+        assert told["after"][f"rmse_{key}"] < 1.2 * told["noise"][key]
+    assert "WARNING" not in capsys.readouterr().out
+
+
 def test_where_all_else_is_calibrated_the_effect_is_fitted_alone(model, extend_by):
     backlash = effect_named("backlash@motor_1")
     session = session_of(model, backlash.with_values({"width_mdeg": 60.0}))

@@ -14,12 +14,14 @@ from wrist_stiffness.inference import Quantity
 from wrist_stiffness.mechanism.rigid_motion import exp_twist
 from wrist_stiffness.model.block import Block
 from wrist_stiffness.model.effect import Effect
+from wrist_stiffness.model.joint_uncertainty import JointUncertainty
 from wrist_stiffness.model.model_file import load_model
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.report.fit_lines import (
     left_line,
     told_lines,
     tolerances,
+    uncertainty_line,
     untold_lines,
     used_lines,
 )
@@ -46,10 +48,9 @@ def test_what_is_not_told_stands_under_what_to_record():
     found = fitted(*fit_cleaned(FitProblem(model, (as_units(model, session),), free)))
     lines = untold_lines(found, found.parameters)
     assert lines == [
-        f"  for these record {find_law('link_stiffness').excited_by}:",
-        "    link_stiffness@link_1, link_2, link_3: flexibility_percent",
-        f"  for these record {find_law('load_scale').excited_by}:",
-        "    load_scale@load_sensor: scale_percent",
+        f"  link_stiffness (3 places): record {find_law('link_stiffness').excited_by}",
+        f"  load_scale@load_sensor: record {find_law('load_scale').excited_by}",
+        "  which parameters, and which only in combination: --json",
     ]
     (line,) = told_lines(found.parameters)
     assert line.split()[:2] == ["encoder_offset@motor_1", "offset_mdeg"]
@@ -88,3 +89,12 @@ def test_an_effect_is_missing_only_where_the_unseen_part_is_above_the_noise(unse
     line = left_line(fit, {"s_um": unseen}, 1)
     begin = "in the fit to the whole session 3.5 um of s remain above the noise"
     assert line.startswith(f"{begin}: {said}")
+
+
+def test_what_was_not_measured_has_no_uncertainty():
+    """A gauge on z tells no rotation; that one was known to 0 mdeg."""
+    sigma = np.array([0.0, 0.0, 1e-6, 0.0, 0.0, 0.0])
+    line = uncertainty_line(JointUncertainty((), sigma, 25.0 * sigma))
+    assert "1 um for the instrument" in line
+    assert "25 um in the wrist's own frame" in line
+    assert "mdeg" not in line

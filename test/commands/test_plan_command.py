@@ -195,6 +195,13 @@ def test_errors_of_the_diagnosis_name_their_place(tmp_path, capsys, change, word
     assert words in capsys.readouterr().err
 
 
+def test_the_result_of_another_command_is_told(tmp_path, capsys):
+    compared = {key: DIAGNOSIS[key] for key in ("schema", "noise")}
+    assert main(["plan", *files(tmp_path, compared), "-o", str(tmp_path / "next")]) == 2
+    words = "found.json: no diagnosis; 'wrist-stiffness diagnose --json FILE' writes one"
+    assert words in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -199,3 +199,19 @@ def test_what_explains_a_little_is_not_told(model):
     measured = session(model, (wave, drift), on_platform=True)
     block = replace(measured.block, load_on_platform=False)
     assert told(model, replace(measured, block=block)) == ""
+
+
+def test_a_lost_beam_is_no_noise_of_the_instrument(model):
+    """One wild reading of sixty; a zone of poses that is off is the model's error."""
+    measured = replace(session(model), covariance=None)
+    sound = compare_models([("m", model)], [measured])
+    shift = measured.shift.copy()
+    shift[20, 0] += 9.0
+    found = compare_models([("m", model)], [replace(measured, shift=shift)])
+    assert (sound.lost, found.lost) == (0, 1)
+    assert "Lost beams, left out: 1 of 60 dwells and moments." in found.verdict
+    error, usual = found.models[0].explained.error, sound.models[0].explained.error
+    assert error["s_um"] == pytest.approx(usual["s_um"], rel=0.2)
+    dent = 2e-5 * np.exp(-np.sum(np.square(measured.block.theta / 0.25), axis=1))
+    zone = replace(measured, shift=measured.shift + dent[:, None])
+    assert compare_models([("m", model)], [zone]).lost == 0

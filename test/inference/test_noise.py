@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference import Observations, Quantity
 from wrist_stiffness.inference.noise import replicate_variance, rich_basis, scatter_of, unstated
 
@@ -125,3 +126,14 @@ def test_what_units_share_is_not_taken_for_their_own_scatter(rng, alike):
     units, variance, _ = unstated(replace(table, values=0.25 * values), nothing, nothing)
     assert units.shared is None
     assert np.sqrt(variance) == pytest.approx(0.25 * np.hypot(count, 0.5), rel=0.2)
+
+
+def test_what_rounding_leaves_of_too_few_numbers_is_no_noise(rng):
+    """Twelve positions do not tell the noise beside forty parameters; repeats would."""
+    values, base = rng.normal(size=(12, 3)), rng.normal(size=(12, 3, 40))
+    with pytest.raises(InputError, match="36 measured numbers are no more than what is fitted"):
+        scatter_of(Observations(values, {}), base, base[:, :, :0])
+    more, columns = np.tile(values, (2, 1)), np.tile(base, (2, 1, 1))
+    more[12:] += rng.normal(size=(12, 3))
+    repeated = Observations(more, {}, replicate=np.tile(np.arange(12), 2))
+    assert scatter_of(repeated, columns, columns[:, :, :0])[1] > 0.0

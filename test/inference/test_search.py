@@ -1,6 +1,7 @@
 """The search where slopes promise more than any fit keeps."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.point import Background, Group, Point
 from wrist_stiffness.inference.possible import Possible
-from wrist_stiffness.inference.reading import probabilities, read, standings
+from wrist_stiffness.inference.reading import NAMING, probabilities, read, settled, standings
 from wrist_stiffness.inference.search import LEADERS, MANY_FITS, TIME_OVER, Search, Trial
 
 ROWS, CANDIDATES = 60, LEADERS + 4
@@ -102,6 +103,23 @@ def test_what_is_handed_over_is_what_is_named(rng):
     assert [each.name for each in reading.named] == [name]
     assert reading.state.names == {name}
     assert reading.state.fit.point.z == pytest.approx(problem.fitted((name,)).point.z)
+
+
+def test_what_the_last_fit_takes_up_is_no_error_that_is_real(rng):
+    """The search ended short of it; then the sets alone say whether an effect is missing."""
+    search = Search(Disappointing(rng, 0.0))
+    search.run()
+    told = read(search)
+    assert told.verdict == "undecided"
+    rough = replace(
+        told, verdict="unknown", probability=1.0, depends_on={"the pose": 1.0}, unexplained=1.0
+    )
+    after = settled(rough, search.base, search, NAMING)
+    assert (after.verdict, after.probability) == (told.verdict, told.probability)
+    assert (after.depends_on, after.unexplained) == ({}, 0.0)
+    left = replace(search.base, evidence=SimpleNamespace(unexplained=1.0))
+    same = settled(rough, left, search, NAMING)
+    assert (same.verdict, same.depends_on) == ("unknown", {"the pose": 1.0})
 
 
 def test_a_better_nominal_fit_is_asked_anew(rng):

@@ -226,6 +226,7 @@ def changed(row, column, value):
         (table_of(FULL, full_cells).splitlines()[0], "no rows below the column names"),
         ("", "no column names in the first line"),
         ("0,1.5,-2\n5,1.6,-2\n", "no column names in the first line"),
+        ("0,1.5,-2,1e-5,,\n", "columns time_s, motor_1_deg, motor_2_deg are missing"),
         (changed(3, "z_mm", "0,02"), "row 3: 20 cells for 19 columns; decimal commas need semico"),
         (table_of(",p999999999x_mm", lambda i: ",1"), "p1x_mm, p1y_mm, p1z_mm of the markers"),
         (table_of(",p" + "9" * 5000 + "x_mm", lambda i: ",1"), "p1x_mm, p1y_mm, p1z_mm of the"),

@@ -118,6 +118,12 @@ def test_too_few_poses_are_refused_with_the_limit(tmp_path, campaign, table):
         read_session(campaign.written(tmp_path / "few"), table)
 
 
+def test_of_one_pose_nobody_says_that_the_load_never_changes(tmp_path, campaign, table):
+    campaign.with_joints().with_loads().with_poses(stamps=campaign.pose_ns[:1])
+    with pytest.raises(InputError, match=r"1 of 1 .* needed \(no more were recorded\)"):
+        read_session(campaign.written(tmp_path / "one"), table)
+
+
 def test_a_load_sensor_without_a_number_is_one_line(tmp_path, campaign, table):
     campaign.with_joints().with_loads(force=lambda i: (np.nan, 0.0, 0.0)).with_poses()
     with pytest.raises(InputError, match="no load estimate is finite; .* not finite, first at"):

@@ -21,12 +21,15 @@ from wrist_stiffness.comparing.wiring import (
     told_mistake,
 )
 from wrist_stiffness.errors import InputError
+from wrist_stiffness.identification.base_fit import without_units
 from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
 from wrist_stiffness.identification.free_effects import answering_as
+from wrist_stiffness.identification.questions import smooth_columns
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.inference.noise import FEWEST_REPEATS, replicate_variance
-from wrist_stiffness.inference.outliers import FEWEST_UNITS
+from wrist_stiffness.inference.observations import Mask
+from wrist_stiffness.inference.outliers import FEWEST_UNITS, OUTLIER_LIMIT, lost_units
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.numerals import number
 from wrist_stiffness.progress import Progress, silent
@@ -55,12 +58,15 @@ def compare_models(
     first = models[0][1]
     cuts = all_units(first, sessions)
     calibrated = said_calibrated(sessions)
-    compared = []
     for name, model in models:
         if not _same_wrist(model, first):
             raise InputError(
                 f"model {name} is of another wrist than {models[0][0]}: its axes differ"
             )
+    lost = _lost_by_all([model for _, model in models], cuts, calibrated)
+    cuts = without_units(cuts, lost)
+    compared = []
+    for name, model in models:
         observed, left, absorbed = _prepared(model, sessions, cuts, calibrated)
         compared.append(ComparedModel(name, observed.observations, left, absorbed))
         progress(len(compared), steps)
@@ -73,7 +79,32 @@ def compare_models(
         repeatability(table),
         repeatability(by_side(table)),
         load_too_large(model, sessions) or told_mistake(suspicion),
+        int(lost.sum()),
     )
+
+
+def _lost_by_all(
+    models: Sequence[ErrorModel], cuts: tuple[UnitSession, ...], calibrated: Sequence[str]
+) -> Mask:
+    """Return which measured units (u,) no model, set-up and smooth law explains: lost beams.
+
+    What only some of the models leave far off is their error.
+    """
+    noise = [np.broadcast_to(np.nan_to_num(each.white), each.values.shape) for each in cuts]
+    used = np.concatenate([each.measured for each in cuts])
+    lost = np.ones(int(used.sum()), dtype=bool)
+    for model in models:
+        _, left, set_ups = without_set_up(model, cuts, calibrated)
+        if left.n_units != len(lost) or len(lost) < FEWEST_UNITS:
+            return np.zeros(len(lost), dtype=bool)
+        columns = side_by_side([each.columns for each in set_ups])[used]
+        beside = [smooth_columns(left), *([] if left.common is None else [left.common])]
+        everything = np.concatenate([columns, *beside], axis=2)
+        lost &= lost_units(left, everything[:, :, :0], everything, OUTLIER_LIMIT)
+        # Exact data scatter by rounding: what is lost is far beyond the noise as well.
+        limit = OUTLIER_LIMIT * np.concatenate(noise)[used]
+        lost &= (np.abs(np.nan_to_num(left.values)) > limit).any(axis=1)
+    return lost
 
 
 def suspicion_in(

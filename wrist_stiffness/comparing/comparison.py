@@ -103,6 +103,7 @@ class Comparison:
     repeated_by_side: dict[str, float]
     # a sentence on a sign, unit or name that may be wrong in the recordings; empty for none
     mistake: str = ""
+    lost: int = 0  # units that were left out as lost beams
 
     @property
     def noise(self) -> dict[str, float]:
@@ -156,6 +157,9 @@ class Comparison:
                 f"{self._sizes(self.noise)}, as play and friction pass for noise here. Repeated "
                 "readings would tell it."
             )
+        if self.lost:
+            units = self.models[0].refitted.n_units + self.lost
+            lines.append(f"Lost beams, left out: {self.lost} of {units} dwells and moments.")
         if self.mistake:
             lines.append(self.mistake)
         return tuple(lines)

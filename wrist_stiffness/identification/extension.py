@@ -216,7 +216,8 @@ def extend(
     judge = Judge(base.base)
     seen, own = judge.seen, list(grown.base.beyond().values())
     before = judge.left(fit_base(model, seen, (), base.base, base=(free, held)))
-    after = judge.left(fit_base(model, seen, own, base.base, base=(others, held)))
+    # A pin that rests where it does leads back there; from the nominal model it may not.
+    after = judge.left(fit_base(model, seen, own, found.base, base=(others, held)))
     progress(4, STEPS)
     if others != free:
         sessions_used = grown.base.problem.sessions

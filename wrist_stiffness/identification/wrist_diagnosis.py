@@ -24,7 +24,15 @@ from wrist_stiffness.inference.evidence import Evidence
 from wrist_stiffness.inference.giving import told
 from wrist_stiffness.inference.held_out import HeldOut, bought, refuted
 from wrist_stiffness.inference.observations import Observations
-from wrist_stiffness.inference.reading import NAMING, Class, Reading, not_shown, read, standings
+from wrist_stiffness.inference.reading import (
+    NAMING,
+    Class,
+    Reading,
+    not_shown,
+    read,
+    settled,
+    standings,
+)
 from wrist_stiffness.inference.search import TIME_OVER, Search, State
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
@@ -119,12 +127,13 @@ def diagnose_sessions(
     require_units(problem.begin().base.problem)
     search = Search(problem, seconds, tell)
     search.run()
-    reading = _settled(read(search, naming))
+    reading = _settled(read(search, naming), search, naming)
     tell("judging by what was held out")
     judge = _Judged(model, units, search, reading.state.fit.base)
     if refuted(judge.before, judge.after):
         # What the held-out part speaks against is not handed over.
-        judge.after, reading = judge.before, _settled(reading.refute(search.base))
+        judge.after = judge.before
+        reading = _settled(reading.refute(search.base), search, naming)
     proposals = None
     if search.ended != TIME_OVER and (reading.verdict == "unknown" or reading.depends_on):
         left = end - time.monotonic()
@@ -183,10 +192,11 @@ def diagnose_sessions(
     )
 
 
-def _settled(reading: Reading) -> Reading:
+def _settled(reading: Reading, search: Search, naming: float) -> Reading:
     """Return a reading with its set as it is handed over."""
     found = reading.state.fit.settled()
-    return replace(reading, state=replace(reading.state, fit=found, evidence=found.evidence))
+    state = replace(reading.state, fit=found, evidence=found.evidence)
+    return settled(reading, state, search, naming)
 
 
 def require_limits(naming: float, seconds: float) -> None:

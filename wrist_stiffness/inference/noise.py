@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtr
 
+from wrist_stiffness.errors import InputError
 from wrist_stiffness.inference.observations import Array, Observations
 from wrist_stiffness.inference.projection import (
     ABSORBED,
@@ -108,7 +109,7 @@ def unstated(
 
     `observations`, `base`, `structure`: as for `scatter_of`.
     Returns the units, with what they share if they do, the variance of the rest of one unit (m,),
-    and the width of its logarithm.
+    and the width of its logarithm.  Raises `InputError` as `scatter_of`.
     """
     variance, repeats = scatter_of(observations, base, structure)
     if observations.shared is not None and observations.stand is not None:
@@ -136,7 +137,8 @@ def scatter_of(observations: Observations, base: Array, structure: Array) -> tup
     `observations`: values, to be explained; `base` (n, m, p), `structure` (n, m, q): columns of
     what is refitted, and of what else could be behind the values.
     Returns (m,) variance of each component, drawn to the mean of its quantity, and degrees of
-    freedom of the repeats in each component, 0 where there are too few.
+    freedom of the repeats in each component, 0 where there are too few.  Raises `InputError` where
+    the base alone leaves nothing of so few numbers: what rounding leaves is no scatter.
     """
     measured = observations.measured
     values = np.where(measured, observations.values, 0.0)
@@ -144,6 +146,12 @@ def scatter_of(observations: Observations, base: Array, structure: Array) -> tup
     repeated, freedom = replicate_variance(values, columns, observations)
     if freedom >= FEWEST_REPEATS:
         return _shrunk(repeated, freedom, observations), freedom
+    numbers, p = int(measured.sum()), base.shape[2]
+    if p >= numbers and orthonormal(columns[:, :, :p][measured]).shape[1] == numbers:
+        raise InputError(
+            f"{numbers} measured numbers are no more than what is fitted to them: nothing tells "
+            "their noise; measure at more poses, or repeat some readings"
+        )
     square, left = _left(observations, base, structure)
     return _shrunk(square / left, float(left.mean()), observations), 0.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -171,14 +171,49 @@ def read(search: Search, naming: float = NAMING) -> Reading:
     state = search.only(frozenset(each.name for each in named))
     first, left = search.base.evidence.unexplained, state.evidence.unexplained
     share = min(left / first, 1.0) if first > 0.0 else float(left > 0.0)
-    nothing = weights.get(frozenset(), 0.0) * (not search.base.rough)
-    verdict: Verdict = "none" if nothing >= 0.5 else "undecided"
-    probability = nothing
-    if named:
-        verdict, probability = "effect", named[0].probability
-    elif search.base.rough or nothing < 1.0 - naming:
-        verdict, probability = "unknown", 1.0 - nothing
+    verdict, probability = _verdict(weights, named, search.base.rough, naming)
     return Reading(state, tuple(classes), named, verdict, probability, _depends_on(state), share)
+
+
+def settled(reading: Reading, state: State, search: Search, naming: float) -> Reading:
+    """Return what the sets say where that which is handed over was fitted to the end.
+
+    What the search had left above the noise may be taken up then: it is no error that is real.
+
+    Parameters
+    ----------
+    reading : Reading
+        Of the search.
+    state : State
+        Its set, fitted to the end.
+    search : Search
+        That ended.
+    naming : float
+        Probability from which an effect is named.
+    """
+    if state.rough or reading.refuted:
+        return replace(reading, state=state)
+    verdict, probability = _verdict(probabilities(search), reading.named, False, naming)
+    return replace(
+        reading,
+        state=state,
+        verdict=verdict,
+        probability=probability,
+        depends_on={},
+        unexplained=0.0,
+    )
+
+
+def _verdict(
+    weights: Mapping[Names, float], named: Sequence[Class], rough: bool, naming: float
+) -> tuple[Verdict, float]:
+    """Return the verdict and its probability; `rough`: more than noise is left without effects."""
+    nothing = weights.get(frozenset(), 0.0) * (not rough)
+    if named:
+        return "effect", named[0].probability
+    if rough or nothing < 1.0 - naming:
+        return "unknown", 1.0 - nothing
+    return "none" if nothing >= 0.5 else "undecided", nothing
 
 
 def _class_of(search: Search, weights: Mapping[Names, float], best: State, name: str) -> Class:

@@ -66,7 +66,10 @@ def read_rivals(path: str | Path) -> Rivals:
     Raises `InputError` if the file cannot be read, a key is missing or wrong, or an effect is not
     of the catalogue.
     """
-    found = DIAGNOSIS(read_json(path, InputError))
+    document = read_json(path, InputError)
+    if isinstance(document.value, dict) and "findings" not in document.value:
+        raise document.refuse("no diagnosis; 'wrist-stiffness diagnose --json FILE' writes one")
+    found = DIAGNOSIS(document)
     silent = found["not_excited"]
     return Rivals(
         (*found["findings"], *found["suspects"]),

@@ -70,8 +70,14 @@ def calibration_lines(found: Calibrated) -> list[str]:
 def uncertainty_line(joint: JointUncertainty) -> str:
     """Tell how well a fit knows where the platform is, for whom."""
     as_measured, in_f = (
-        f"{number(MICROMETRES * float(np.linalg.norm(sigma[:3])), 2)} um and "
-        f"{number(MILLIDEGREES * float(np.linalg.norm(sigma[3:])), 2)} mdeg"
+        " and ".join(
+            f"{number(factor * float(np.linalg.norm(own)), 2)} {unit}"
+            for own, factor, unit in (
+                (sigma[:3], MICROMETRES, "um"),
+                (sigma[3:], MILLIDEGREES, "mdeg"),
+            )
+            if own.any()  # what was not measured has none
+        )
         for sigma in (joint.measured, joint.platform)
     )
     return (
@@ -178,25 +184,23 @@ def told_lines(
 
 
 def untold_lines(found: WristFit, parameters: Iterable[FittedParameter]) -> list[str]:
-    """Tell what the data do not say, by what to record to see it."""
+    """Tell in short what the data do not say, or not all of, by what to record to see it."""
     needs = {each.effect.name: each.effect.law.excited_by for each in found.problem.free}
-    # Several sessions may say the same of one parameter.
-    untold: dict[str, dict[str, None]] = {}
-    for each in parameters:
-        if not each.excited:
-            twin = f" (only its combination with {each.together[0]} is)" if each.together else ""
-            untold.setdefault(each.effect, {})[f"{each.key}{twin}"] = None
-    alike: dict[str, dict[tuple[str, str], list[str]]] = {}
-    for effect, keys in untold.items():
-        law, _, place = effect.partition("@")
-        same = alike.setdefault(needs[effect], {})
-        same.setdefault((law, ", ".join(keys)), []).append(place)
+    # Several sessions, and several parameters of an effect, may say the same.
+    untold = dict.fromkeys(each.effect for each in parameters if not each.excited)
+    alike: dict[str, dict[str, list[str]]] = {}
+    for effect in untold:
+        law = effect.partition("@")[0]
+        alike.setdefault(needs[effect], {}).setdefault(law, []).append(effect)
     lines = []
-    for need, effects in alike.items():
-        lines.append(f"  for these record {need}:")
-        lines += [
-            f"    {law}@{', '.join(places)}: {keys}" for (law, keys), places in effects.items()
-        ]
+    for need, laws in alike.items():
+        names = (
+            effects[0] if len(effects) == 1 else f"{law} ({len(effects)} places)"
+            for law, effects in laws.items()
+        )
+        lines.append(f"  {', '.join(names)}: record {need}")
+    if lines:
+        lines.append("  which parameters, and which only in combination: --json")
     return lines
 
 

@@ -57,7 +57,7 @@ class ClockOffset:
     # `seconds`, `sigma`: estimate and one standard uncertainty [s]
     seconds: float
     sigma: float
-    gain: float  # mean squared misfit of the motion without the offset over that with it
+    gain: float  # unexplained share of the motion without the offset over that with it
     misfit: float  # root mean square of the latter [rad]
 
     @property
@@ -129,10 +129,16 @@ class _Motion:
         ]
         return inside, (self.turned[rows][inside] - _angle(*at)) ** 2
 
-    def misfit(self, offset: float, rows: Rows = slice(None)) -> float:
-        """Return the mean squared misfit, infinite where too few are inside."""
+    def unexplained(self, offset: float, rows: Rows = slice(None)) -> float:
+        """Return the share of the squared motion left, infinite where too few are inside.
+
+        Of the same pairs: an offset that moves all motion into holes has explained nothing.
+        """
         inside, squares = self.squares(offset, rows)
-        return float(np.mean(squares)) if inside.sum() >= LEAST_OVERLAP * len(inside) else np.inf
+        if inside.sum() < LEAST_OVERLAP * len(inside):
+            return np.inf
+        moved = float(np.sum(self.turned[rows][inside] ** 2))
+        return float(np.sum(squares)) / max(moved, np.finfo(float).tiny)
 
 
 TRIED_S = np.linspace(-SEARCHED_S, SEARCHED_S, 2 * STEPS + 1)
@@ -159,18 +165,18 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
     motion = _Motion.of(time_ns, measured, rigid)
     if motion is None:
         return None
-    misfit, pairs = motion.misfit, len(motion.turned)
+    unexplained, pairs = motion.unexplained, len(motion.turned)
     scan = slice(None, None, -(-pairs // SCANNED))
-    likely = TRIED_S[np.argsort([misfit(offset, scan) for offset in TRIED_S])[:LIKELY]]
-    best = float(likely[np.argmin([misfit(offset) for offset in likely])])
-    if not np.isfinite(misfit(best)):
+    likely = TRIED_S[np.argsort([unexplained(offset, scan) for offset in TRIED_S])[:LIKELY]]
+    best = float(likely[np.argmin([unexplained(offset) for offset in likely])])
+    if not np.isfinite(unexplained(best)):
         return None
     step = SEARCHED_S / STEPS
 
     def refined(rows: Rows, near: float) -> float:
         bounds = (near - step, near + step)
         with np.errstate(invalid="ignore"):  # at the end of the overlap it is infinite
-            found = minimize_scalar(misfit, bounds=bounds, args=(rows,), method="bounded")
+            found = minimize_scalar(unexplained, bounds=bounds, args=(rows,), method="bounded")
         return float(found.x)
 
     offset = refined(slice(None), best)
@@ -181,8 +187,10 @@ def clock_offset(time_ns: Stamps, measured: Array, rigid: Signal) -> ClockOffset
         if np.sqrt(np.mean(motion.turned[rows] ** 2)) > LEAST_MOTION
     ]
     sigma = float(np.std(each, ddof=1) / np.sqrt(len(each))) if len(each) > 1 else step
-    left = max(misfit(offset), np.finfo(float).tiny)
-    return ClockOffset(offset, sigma, misfit(0.0) / left, float(np.sqrt(left)))
+    left = max(unexplained(offset), np.finfo(float).tiny)
+    _, squares = motion.squares(offset)
+    misfit = float(np.sqrt(np.mean(squares)))
+    return ClockOffset(offset, sigma, unexplained(0.0) / left, misfit)
 
 
 def clock_step(

@@ -99,10 +99,10 @@ def columns_of(header: Sequence[str], gauges: Sequence[str] = ()) -> Columns:
     """
     if not any(letter.isalpha() for name in header for letter in name):
         raise InputError("no column names in the first line")
+    _require((TIME, *MOTORS), header)
     for name, times in Counter(header).items():
         if times > 1:
             raise InputError(f"column {name or '(without a name)'} is there twice")
-    _require((TIME, *MOTORS), header)
     loads = any(name in header for name in LOAD)
     if loads:
         _require(LOAD, header, " of the load")

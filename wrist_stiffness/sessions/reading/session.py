@@ -206,7 +206,7 @@ def session_of(
     lost = lost_beams(measured.time, shift, rotation, meant, step)
     if lost.any():
         remarks.append(f"{lost.sum()} of {len(lost)} measured poses are lost beams: left out")
-    if np.all(measured.load == measured.load[0]):
+    if len(measured) > 1 and np.all(measured.load == measured.load[0]):
         remarks.append(
             "the load never changes: what the load does and what is always there look the same"
         )
