@@ -21,15 +21,14 @@ from wrist_stiffness.comparing.wiring import (
     told_mistake,
 )
 from wrist_stiffness.errors import InputError
-from wrist_stiffness.identification.base_fit import without_units
+from wrist_stiffness.identification.base_fit import unexplained_units, without_units
 from wrist_stiffness.identification.calibration import Calibration, calibrate, said_calibrated
 from wrist_stiffness.identification.free_effects import answering_as
-from wrist_stiffness.identification.questions import smooth_columns
 from wrist_stiffness.identification.taken_up import TakenUp
 from wrist_stiffness.inference import Observations
 from wrist_stiffness.inference.noise import FEWEST_REPEATS, replicate_variance
 from wrist_stiffness.inference.observations import Mask
-from wrist_stiffness.inference.outliers import FEWEST_UNITS, OUTLIER_LIMIT, lost_units
+from wrist_stiffness.inference.outliers import FEWEST_UNITS, OUTLIER_LIMIT
 from wrist_stiffness.model.error_model import ErrorModel
 from wrist_stiffness.numerals import number
 from wrist_stiffness.progress import Progress, silent
@@ -98,9 +97,7 @@ def _lost_by_all(
         if left.n_units != len(lost) or len(lost) < FEWEST_UNITS:
             return np.zeros(len(lost), dtype=bool)
         columns = side_by_side([each.columns for each in set_ups])[used]
-        beside = [smooth_columns(left), *([] if left.common is None else [left.common])]
-        everything = np.concatenate([columns, *beside], axis=2)
-        lost &= lost_units(left, everything[:, :, :0], everything, OUTLIER_LIMIT)
+        lost &= unexplained_units(left, columns)
         # Exact data scatter by rounding: what is lost is far beyond the noise as well.
         limit = OUTLIER_LIMIT * np.concatenate(noise)[used]
         lost &= (np.abs(np.nan_to_num(left.values)) > limit).any(axis=1)

@@ -20,6 +20,7 @@ from wrist_stiffness.identification.free_effects import (
 )
 from wrist_stiffness.identification.problem import STEP, FitProblem, Unknown
 from wrist_stiffness.identification.questions import smooth_columns
+from wrist_stiffness.inference.observations import Observations
 from wrist_stiffness.inference.outliers import OUTLIER_LIMIT, lost_units
 from wrist_stiffness.mechanism.components import Array
 from wrist_stiffness.model.effect import Effect
@@ -205,10 +206,7 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
         table = problem.table.with_values(found.residual)
         # Exact data scatter by rounding: what is lost is far beyond the noise as well.
         white = problem.whiten(found.residual).reshape(table.values.shape)
-        beside = [smooth_columns(table), *([] if table.common is None else [table.common])]
-        everything = np.concatenate([found.columns, *beside], axis=2)
-        # What is left of the base after its fit is small: nothing of it must be in the model.
-        lost = lost_units(table, everything[:, :, :0], everything, OUTLIER_LIMIT)
+        lost = unexplained_units(table, found.columns)
         lost &= np.abs(white).max(axis=1) > OUTLIER_LIMIT
         if not lost.any():
             break
@@ -217,6 +215,17 @@ def fit_cleaned(problem: FitProblem, start: Array | None = None) -> tuple[BaseFi
         near = found.columns[~lost]
         found = _descended(problem, problem, problem, found.z, near=near)
     return found, total
+
+
+def unexplained_units(left: Observations, columns: Array) -> Mask:
+    """Return which units (u,) of what a fit left no smooth law explains, nor its own columns.
+
+    `columns` (u, m, p): slopes of the fit.
+    """
+    beside = [smooth_columns(left), *([] if left.common is None else [left.common])]
+    everything = np.concatenate([columns, *beside], axis=2)
+    # What is left of the base after its fit is small: nothing of it must be in the model.
+    return lost_units(left, everything[:, :, :0], everything, OUTLIER_LIMIT)
 
 
 def without_units(sessions: tuple[UnitSession, ...], aside: Mask) -> tuple[UnitSession, ...]:
