@@ -7,10 +7,12 @@ from measured_wrist import wrong_wrist
 from scipy.spatial.transform import Rotation
 
 from wrist_stiffness.identification.strained import strain
+from wrist_stiffness.identification.wrist_diagnosis import diagnose_sessions
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.model.effect import effect_at
 from wrist_stiffness.model.registry import find_law
 from wrist_stiffness.sessions.unit_session import as_units
+from wrist_stiffness.simulation.catalogue import HiddenEffect
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +71,18 @@ def test_a_load_sensor_far_off_is_to_be_measured_first(model, day):
     assert found.first == "load_scale@load_sensor scale_percent"
     assert found.times < -4.0
     assert "times its tolerance; with that all others are within theirs" in found.sentence
+
+
+def test_a_fault_whose_slopes_show_nothing_is_asked_for_where_tolerances_make_up_for_it(
+    model, in_the_cell
+):
+    """A flange that stands open touches nothing: tolerances bent the contact as it was measured."""
+    opened = HiddenEffect("flange_contact", "joint_2", "open", 2e-5, 3)
+    settings = wrong_wrist(60.0, 3, 3, rate_hz=20.0, hidden=(opened,))
+    day = in_the_cell(model.table, settings, 5)
+    before = strained(model, day)
+    assert "outside its tolerances" in before.sentence
+    answer = diagnose_sessions(model, [day])
+    assert [each.names for each in answer.diagnosis.findings] == [("flange_contact@joint_2",)]
+    assert answer.strain.sentence == ""
+    assert answer.strain.square < 0.5 * before.square

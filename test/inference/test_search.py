@@ -49,6 +49,9 @@ class Disappointing:
     def giving(self, fit):
         return ()
 
+    def strained(self, fit):
+        return False
+
     def fitted(self, names):
         empty = np.zeros((ROWS, 0))
         columns = np.concatenate([empty, *(self.whole[name] for name in names)], axis=1)

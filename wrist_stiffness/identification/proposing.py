@@ -31,7 +31,7 @@ from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.identification.wrist_problem import WristProblem
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.evidence import Evidence
-from wrist_stiffness.inference.point import Point
+from wrist_stiffness.inference.point import EXPECTED, Point
 from wrist_stiffness.inference.reading import MEMBER, NAMING, stands_in
 from wrist_stiffness.inference.search import NEGLIGIBLE
 from wrist_stiffness.mechanism.components import Array
@@ -64,7 +64,8 @@ class _Judged:
     def stands_in(self, before: Evidence) -> float:
         """Return the probability that it only looks like what is missing beside a fit."""
         had = before.unexplained
-        return stands_in(self.state.unexplained / had) if had else 0.0
+        # Beside it, an effect of the catalogue may be missing too.
+        return stands_in(self.state.unexplained / had, EXPECTED) if had else 0.0
 
 
 def propose(

@@ -40,9 +40,14 @@ class Strain:
     rest: float  # chi-square that is left then
 
     @property
+    def rare(self) -> bool:
+        """Whether hardly any wrist within its tolerances is as far off."""
+        return self.chance < RARE
+
+    @property
     def sentence(self) -> str:
         """What it says of the wrist; empty where it is within its tolerances."""
-        if self.chance > RARE:
+        if not self.rare:
             return ""
         how = f"chi-square {self.square:.0f} where {self.freedom} is usual"
         text = (

@@ -28,6 +28,7 @@ from wrist_stiffness.identification.candidates import (
 )
 from wrist_stiffness.identification.likelihood import likelihood_of
 from wrist_stiffness.identification.problem import FitProblem
+from wrist_stiffness.identification.strained import strain
 from wrist_stiffness.identification.wrist_fit import WristFit
 from wrist_stiffness.inference.amplitudes import evidence
 from wrist_stiffness.inference.point import Background
@@ -203,6 +204,11 @@ class WristProblem:
         """Return the fit with one effect less, begun where this one ended."""
         others = [each for own, each in fit.base.beyond().items() if own != name]
         return self._fitted(others, fit.base)
+
+    def strained(self, fit: WristFit) -> bool:
+        """Tell whether the tolerances took up more than those of a sound wrist would."""
+        tense = strain(fit)
+        return tense is not None and tense.rare
 
     def _fitted(self, extras: Sequence[Effect], start: BaseFit | None, **how: bool) -> WristFit:
         own = fit_base(self._model, self._sessions, extras, start, base=self._base, **how)

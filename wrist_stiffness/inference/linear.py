@@ -219,6 +219,10 @@ class LinearProblem:
         found = self.fitted(terms)
         return found if np.any(found.z[found.places[name]]) else None
 
+    def strained(self, fit: LinearFit) -> bool:
+        """Tell that nothing is: a plain table does not say what its nuisances may be at most."""
+        return False
+
     def without(self, fit: LinearFit, name: str) -> LinearFit:
         """Return the fit with one effect less."""
         return self.fitted({own: term for own, term in fit.terms.items() if own != name})

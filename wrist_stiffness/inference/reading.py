@@ -131,21 +131,24 @@ def probabilities(search: Search) -> dict[Names, float]:
     return dict(zip(logs, (weights / weights.sum()).tolist(), strict=True))
 
 
-def stands_in(rest: float) -> float:
+def stands_in(rest: float, beside: float = OUTSIDE) -> float:
     """Return the probability that an effect only stands in for one outside the catalogue.
 
     What is outside leaves any share of itself in the shape of its best imitation; an effect that is
-    there leaves nothing there, or now and then a second one that looks like it, of any size.
+    there leaves nothing there, or now and then something else that looks like it, of any size.
 
     Parameters
     ----------
     rest : float
         Share that is left in its shape, 0 where it is no more than noise.
+    beside : float, optional
+        How much else is missing on average that may have left it; by default what is outside, for
+        of the catalogue nothing explains what is left.
     """
     rest, outside = min(rest, 1.0), OUTSIDE / EXPECTED
     if rest <= LEAST_REST:
         return outside * LEAST_REST / (outside * LEAST_REST + 1.0)
-    there = EXPECTED / (rest * -np.log(LEAST_REST))
+    there = beside / (rest * -np.log(LEAST_REST))
     return float(outside / (outside + there))
 
 

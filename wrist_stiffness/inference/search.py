@@ -106,6 +106,9 @@ class Problem(Protocol):
     def without(self, fit: Any, name: str) -> Any:
         """Return the fit with one effect less, begun where this one ended."""
 
+    def strained(self, fit: Any) -> bool:
+        """Tell whether set-up and tolerances took up more than those of a sound mechanism would."""
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -271,8 +274,12 @@ class Search:
             least = SHARE * (instead_of.evidence.log - state.evidence.log)
             as_noise = self._in_place(state, instead_of, as_noise, logs)
             beyond = self._in_place(state, instead_of, beyond, logs)
-        leaders = self._leaders(as_noise, beyond)
-        others = _one_of_each_law(as_noise, leaders) if state.rough else []
+        leaders, unsloped = self._leaders(as_noise, beyond), _unsloped(as_noise)
+        others = _one_of_each_law(unsloped, leaders) if state.rough else []
+        if not state.rough and self._problem.strained(state.fit):
+            # Contact may make up for a fault of the geometry, at many places alike.
+            known = {each.trial.name for each in leaders}
+            leaders += [each for each in unsloped if each.trial.name not in known]
         best = state.evidence.log + max(self.price, least + NEGLIGIBLE)
         reach: dict[str, float] = {}
 
@@ -365,7 +372,9 @@ class Search:
                 log = evidence(near.point, self._problem.background, state.evidence).log
                 if not state.names:
                     self.promised[each.trial.name] = log - state.evidence.log
-                if each.trial.walls and log > state.evidence.log:
+                # Columns of tolerances that gave way to it are not those of a sound base.
+                bent = not (each.trial.smooth or state.rough)
+                if (each.trial.walls or bent) and log > state.evidence.log:
                     # How much it explains, only a whole fit tells.
                     log = np.inf
             found.append((log, each))
@@ -427,12 +436,14 @@ class Search:
         return fit, found
 
 
+def _unsloped(ranking: Sequence[Ranked]) -> list[Ranked]:
+    """Return the candidates whose slopes do not show what they do."""
+    return [each for each in ranking if not each.trial.smooth]
+
+
 def _one_of_each_law(ranking: Sequence[Ranked], but: Sequence[Ranked]) -> list[Ranked]:
-    """Return the first place of each law whose slopes do not show what it does, but for some."""
-    laws: dict[str, Ranked] = {}
-    for each in ranking:
-        if not each.trial.smooth:
-            laws.setdefault(each.trial.law, each)
+    """Return the first place of each law, but for some."""
+    laws = {each.trial.law: each for each in reversed(ranking)}
     known = {each.trial.name for each in but}
     return [each for each in laws.values() if each.trial.name not in known]
 

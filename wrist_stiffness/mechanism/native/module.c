@@ -111,7 +111,7 @@ static PyObject *forward_of(PyObject *self, PyObject *const *args, Py_ssize_t co
 
 /* Parts, configurations (n, 66), wrenches (n, 6), screws in both limbs (n, 6) and openings (n, m) or
  * None, contact states (n, m) to begin with; twists (n, 6), forces (n, m); m.  Returns the first status
- * that is not OK. */
+ * that is not OK.  Where the state to begin with was wrong one sample before, that sample's serves. */
 static PyObject *respond_of(PyObject *self, PyObject *const *args, Py_ssize_t count) {
     long m;
     if (counted(count, 10) || sectors(args[9], &m)) return 0;
@@ -127,12 +127,17 @@ static PyObject *respond_of(PyObject *self, PyObject *const *args, Py_ssize_t co
     const double *opening = b.view[5].buf;
     unsigned char *closed = b.view[6].buf;
     double *twist = b.view[7].buf, *force = b.view[8].buf;
-    int status = OK;
+    int status = OK, misled = 0;
+    unsigned char guess[MOST_SECTORS];
     Py_BEGIN_ALLOW_THREADS
-    for (Py_ssize_t i = 0; i < n && !status; i++)
+    for (Py_ssize_t i = 0; i < n && !status; i++, closed += m) {
+        memcpy(guess, closed, (size_t)m);
+        if (misled) memcpy(closed, closed - m, (size_t)m);
         status = respond(b.view[0].buf, (int)m, at + i, wrench + 6 * i, limb_1 ? limb_1 + 6 * i : 0,
-                         limb_2 ? limb_2 + 6 * i : 0, opening ? opening + m * i : 0,
-                         closed + m * i, twist + 6 * i, force + m * i);
+                         limb_2 ? limb_2 + 6 * i : 0, opening ? opening + m * i : 0, closed,
+                         twist + 6 * i, force + m * i);
+        misled = memcmp(guess, closed, (size_t)m) != 0;
+    }
     Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(status);
