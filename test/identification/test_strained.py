@@ -83,6 +83,8 @@ def test_a_fault_whose_slopes_show_nothing_is_asked_for_where_tolerances_make_up
     before = strained(model, day)
     assert "outside its tolerances" in before.sentence
     answer = diagnose_sessions(model, [day])
-    assert [each.names for each in answer.diagnosis.findings] == [("flange_contact@joint_2",)]
+    (finding,) = answer.diagnosis.findings
+    assert finding.names == ("flange_contact@joint_2",)
+    assert f"Without it the wrist is outside its tolerances ({before.how})" in finding.evidence
     assert answer.strain.sentence == ""
     assert answer.strain.square < 0.5 * before.square

@@ -45,13 +45,17 @@ class Strain:
         return self.chance < RARE
 
     @property
+    def how(self) -> str:
+        """How far off all of them are."""
+        return f"chi-square {self.square:.0f} where {self.freedom} is usual"
+
+    @property
     def sentence(self) -> str:
         """What it says of the wrist; empty where it is within its tolerances."""
         if not self.rare:
             return ""
-        how = f"chi-square {self.square:.0f} where {self.freedom} is usual"
         text = (
-            f"The wrist is outside its tolerances ({how}). Measure {self.first} first: "
+            f"The wrist is outside its tolerances ({self.how}). Measure {self.first} first: "
             f"{self.value:.3g}, {abs(self.times):.1f} times its tolerance"
         )
         if chdtrc(max(self.freedom - 1, 1), self.rest) > RARE:

@@ -281,7 +281,7 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
     gives = {g.way: size for g, size in state.evidence.given.items() if g.name == found.name}
     sentences = [
         f"{find_law(law).sentence.format(place=place)}.",
-        f"Explains {100.0 * explained:.3g} % of the error above the noise.",
+        _shown_by(search, found),
         *(told(way, *size) for way, size in gives.items()),
     ]
     return Finding(
@@ -296,6 +296,15 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
         find_law(law).check,
         gives,
     )
+
+
+def _shown_by(search: Search, found: Class) -> str:
+    """Return what shows an effect, in a sentence."""
+    without = search.states.get(search.best.names - {found.name}, search.base)
+    tense = None if without.rough else strain(without.fit)
+    if tense and tense.rare:
+        return f"Without it the wrist is outside its tolerances ({tense.how})."
+    return f"Explains {100.0 * (1.0 - found.left):.3g} % of the error above the noise."
 
 
 def _law_and_place(name: str) -> tuple[str, str]:
