@@ -315,7 +315,7 @@ class Search:
                 reach[law] = max(reach.get(law, 0.0), logs[name] - log if log < np.inf else np.inf)
 
         ask(leaders)
-        if all(each.rough for each in found):
+        if all(each.rough or self._problem.strained(each.fit) for each in found):
             ask(others)
         if found:
             leading = max(found, key=lambda each: each.evidence.log)
