@@ -20,6 +20,9 @@ Rows: TypeAlias = "Sequence[Row]"
 POSE = ("s_um", "phi_mdeg")
 """Quantities of poses, which have columns; a recording may lack one."""
 
+OPEN = {"unknown": "something unknown", "undecided": "not decided"}
+"""What is said of verdicts beside what is named."""
+
 
 def compared_lines(rows: Rows) -> list[str]:
     """Return each model against each recording, from what `compare` gives for a program."""
@@ -85,18 +88,24 @@ def _table(rows: Rows, last: str, cells: Callable[[Values], list[str]], done: st
 
 
 def _below(rows: Rows, mistakes: Callable[[Values], list[str]]) -> list[str]:
-    """Return the mistakes of the set-up that recordings show."""
-    told = [(row.item, row.result) for row in rows if row.result is not None]
-    below = [f"{item}: {sentence}" for item, values in told for sentence in mistakes(values)]
+    """Return the mistakes of the set-up that recordings show, and what is said of them alone."""
+    below = []
+    for row in rows:
+        if row.result is not None:
+            # Other notes are of a model, the same for all.
+            own = tuple(f"{name}: " for name in row.result["provenance"]["recordings"])
+            notes = [note.split(": ", 1)[1] for note in row.result["notes"] if note.startswith(own)]
+            below += [f"{row.item}: {sentence}" for sentence in (*mistakes(row.result), *notes)]
     return ["", *below] if below else []
 
 
 def _missing(values: Values) -> str:
-    """Return what is missing: a class by its best member, and whether more is unknown."""
+    """Return what is missing: a class by its best member, and whether more is open."""
     named = []
     for finding in values["findings"]:
         best, *others = (f"{each['effect']}@{each['component']}" for each in finding["class"])
         named.append(f"{best} (or {len(others)} more)" if others else best)
-    if values["verdict"] == "unknown":
-        named.append("something unknown")
-    return ", ".join(named) or "nothing"
+    if values["verdict"] in OPEN:
+        named.append(OPEN[values["verdict"]])
+    ended = "" if values["complete"] else f" ({values['ended']})"
+    return f"{', '.join(named) or 'nothing'}{ended}"
