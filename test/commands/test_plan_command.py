@@ -126,6 +126,19 @@ def test_table_summary_picture_and_json_belong_together(folder, rows):
     assert float(rows[-1]["time_s"]) < values["duration_s"]
 
 
+def test_the_summary_counts_and_loads_are_those_of_the_table(folder, tmp_path, capsys):
+    """A short commissioning has its load in the long holds alone, and said "loads: none"."""
+    arguments = ["--commissioning", "--minutes", "3.5", *files(tmp_path)[2:]]
+    assert main(["plan", *arguments, "-o", str(tmp_path / "first")]) == 0
+    for made in (tmp_path / "first", folder / "next"):
+        with (made / "plan.csv").open(newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        poses = len({(row["motor_1_deg"], row["motor_2_deg"]) for row in rows})
+        first, by_hand = (made / "summary.txt").read_text().splitlines()[:2]
+        assert f"to {poses} poses; {len(rows)} measurements at rest; loads: gripper" in first
+        assert "take it off after the row" in by_hand
+
+
 def test_what_many_rivals_leave_open_is_a_line_for_each_truth():
     rivals = {"creep@joint_1": 0.5, "backlash@motor_1": 0.25, "": 0.75, "gravity@link_3": 0.0}
     answers = tuple(Answer(Goal("inertia@platform", r), d, True) for r, d in rivals.items())

@@ -31,6 +31,11 @@ TWICE = (
     "others show."
 )
 
+BY_HAND = (
+    "Put a load on in the seconds of its change_s before a row of plan.csv, and take it off after "
+    "the row, also where the next row has it again: the motors stand still meanwhile."
+)
+
 
 def require_new_folder(folder: str | Path) -> None:
     """Refuse a folder that exists, or whose parent does not (InputError)."""
@@ -131,12 +136,15 @@ def plan_summary(plan: Plan, commissioning: bool = False) -> str:
 def _what(plan: Plan) -> str:
     if plan.timeline is None:
         return "no plan: nothing that these loads allow would settle any of the questions"
-    loads = sorted({visit.load.name for visit in plan.visits if visit.load.name})
-    poses = len({tuple(visit.theta) for visit in plan.visits})
-    return (
-        f"{plan.timeline.duration_s / 60.0:.1f} minutes: {len(plan.visits)} approaches to {poses} "
-        f"poses; {len(plan.timeline.dwells)} measurements at rest; "
-        f"loads: {', '.join(loads) or 'none'}"
+    timeline, dwells = plan.timeline, plan.timeline.dwells
+    loads = sorted({dwell.load.name for dwell in dwells if dwell.load.name})
+    poses = len({tuple(dwell.visit.theta) for dwell in dwells})
+    return "\n".join(
+        [
+            f"{timeline.duration_s / 60.0:.1f} minutes: {len(timeline.ends)} approaches to {poses} "
+            f"poses; {len(dwells)} measurements at rest; loads: {', '.join(loads) or 'none'}",
+            *([BY_HAND] if loads else []),
+        ]
     )
 
 
