@@ -9,11 +9,13 @@ from rosbags.highlevel import AnyReader
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.inference.answer import Diagnosis, Finding, NotExcited
+from wrist_stiffness.model.model_file import file_sha256
 from wrist_stiffness.planning import pool
 from wrist_stiffness.planning.aims import Answer
 from wrist_stiffness.planning.information import Goal
 from wrist_stiffness.planning.plan import Plan
 from wrist_stiffness.report.plan import plan_summary
+from wrist_stiffness.shipped import shipped_file
 
 LOADS = """
 schema: 1
@@ -206,6 +208,19 @@ def test_errors_of_the_diagnosis_name_their_place(tmp_path, capsys, change, word
     arguments = files(tmp_path, {**DIAGNOSIS, **change})
     assert main(["plan", *arguments, "-o", str(tmp_path / "next")]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_another_model_than_the_one_diagnosed_is_told(tmp_path, capsys):
+    for name, told in (("other", True), ("palmieri2015_model", False)):
+        model = shipped_file("config/palmieri2015_model.yaml")
+        sha256 = "00" if told else file_sha256(model)
+        made_from = {"models": {name: sha256}, "recordings": {"day_1": "11"}}
+        arguments = files(tmp_path, {**DIAGNOSIS, "provenance": made_from})
+        assert main(["plan", *arguments, "--minutes", "4", "-o", str(tmp_path / name)]) == 0
+        first = (tmp_path / name / "summary.txt").read_text().splitlines()[0]
+        assert first in capsys.readouterr().out
+        words = f"{model} is not what {tmp_path / 'found.json'} was made from: give the model and"
+        assert first.startswith(words) == told
 
 
 def test_the_result_of_another_command_is_told(tmp_path, capsys):

@@ -68,7 +68,7 @@ def plan(arguments: argparse.Namespace) -> int:
 
     for example:
       wrist-stiffness plan --commissioning --loads loads.yaml --minutes 30 -o first_plan
-      wrist-stiffness plan --diagnosis found.json --recording day_1 --loads loads.yaml -o next_plan
+      wrist-stiffness plan worn.yaml --diagnosis why.json --recording day --loads loads.yaml -o next
       ros2 bag play first_plan/trajectory     # with /motor_trajectory remapped to your controller
 
     loads.yaml:
@@ -106,7 +106,7 @@ def plan(arguments: argparse.Namespace) -> int:
         recordings,
         Progress("plan"),
     )
-    text = plan_summary(planned.plan, arguments.commissioning)
+    text = "\n".join([*planned.remarks, plan_summary(planned.plan, arguments.commissioning)])
     say(arguments, [text], planned.as_values())
     timeline = planned.plan.timeline
     if timeline is None:
