@@ -184,7 +184,10 @@ def test_what_no_load_can_settle_is_a_no_and_writes_nothing(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"schema": 1}, "found.json: schema: 1 is not 2"),
+        (
+            {"schema": 1},
+            "schema: 1 is not 2, the version that this program reads: make the file anew with it",
+        ),
         ({"findings": {}}, "found.json: findings: {} is not a list"),
         ({"noise": {"s_um": 0.0, "phi_mdeg": 1.0}}, "noise.s_um: 0.0 is not above 0"),
         ({"noise": {"gauges_um": 1.0}}, "position and rotation, not gauges_um alone"),
