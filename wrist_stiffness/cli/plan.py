@@ -62,9 +62,10 @@ def plan(arguments: argparse.Namespace) -> int:
     one: it separates the effects that 'diagnose --json' could not tell apart. LOADS.yaml lists the
     loads that you can apply; nothing else is proposed.
 
-    PLAN is a folder: plan.csv (a row for each measurement at rest), trajectory (a recording with
-    the motors' motion as one message on /motor_trajectory), plan.png and summary.txt. Loads that
-    hands put on are due at the times of the table. Drive near the first pose before you start.
+    PLAN is a folder: plan.csv (a row for each measurement at rest), path.csv (the way between them
+    too, a table for 'import' to be filled in), trajectory (a recording with the motors' motion as
+    one message on /motor_trajectory), plan.png and summary.txt. Loads that hands put on are due at
+    the times of plan.csv. Drive near the first pose before you start.
 
     for example:
       wrist-stiffness plan --commissioning --loads loads.yaml --minutes 30 -o first_plan

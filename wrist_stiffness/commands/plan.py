@@ -39,7 +39,6 @@ COLUMNS = (
     "purpose",
 )
 
-
 LONGEST_MIN = 120.0
 """Minutes of one experiment; planning takes 2 GB and minutes for so many."""
 
@@ -152,8 +151,7 @@ def plan_experiment(
         None if options.minutes is None else 60.0 * options.minutes,
         options.seed,
     )
-    planned = plan(model, question, conditions, earlier, progress)
-    return Planned(model, planned, tuple(remarks))
+    return Planned(model, plan(model, question, conditions, earlier, progress), tuple(remarks))
 
 
 def plan_rows(timeline: Timeline) -> list[dict[str, Any]]:
