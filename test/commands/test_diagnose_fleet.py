@@ -62,6 +62,13 @@ def test_each_wrist_has_a_line_that_says_what_is_missing():
     assert lines[1].index("  missing") == said["b.mcap"].index("  backlash")
 
 
+def test_what_gauges_read_has_columns_of_its_own():
+    rows = (Answer(Path("a.mcap"), diagnosed("none", keys=("gauges_um",))),)
+    _, header, line = diagnosed_lines(rows)
+    assert header.split()[:4] == ["recording", "gauges", "[um]", "noise"]
+    assert line.split() == ["a.mcap", "12.3", "->", "1.23", "1.1", "nothing"]
+
+
 @pytest.mark.slow
 def test_a_folder_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys):
     folder = tmp_path / "wrists"

@@ -248,7 +248,9 @@ def test_another_model_than_the_one_diagnosed_is_told(tmp_path, capsys):
 def test_the_result_of_another_command_is_told(tmp_path, capsys):
     compared = {key: DIAGNOSIS[key] for key in ("schema", "noise")}
     assert main(["plan", *files(tmp_path, compared), "-o", str(tmp_path / "next")]) == 2
-    words = "found.json: no diagnosis; 'wrist-stiffness diagnose --json FILE' writes one"
+    words = (
+        "found.json: no diagnosis of one wrist; 'diagnose --json FILE' without --each writes one"
+    )
     assert words in capsys.readouterr().err
 
 

@@ -70,7 +70,9 @@ def read_rivals(path: str | Path) -> Rivals:
     """
     document = read_json(path, InputError)
     if isinstance(document.value, dict) and "findings" not in document.value:
-        raise document.refuse("no diagnosis; 'wrist-stiffness diagnose --json FILE' writes one")
+        raise document.refuse(
+            "no diagnosis of one wrist; 'diagnose --json FILE' without --each writes one"
+        )
     found = DIAGNOSIS(document)
     silent, made_from = found["not_excited"], found.get("provenance", {})
     return Rivals(

@@ -18,7 +18,7 @@ Values = dict[str, Any]
 Rows: TypeAlias = "Sequence[Row]"
 
 POSE = ("s_um", "phi_mdeg")
-"""Quantities of poses, which have columns; a recording may lack one."""
+"""Quantities that have columns where nothing was measured."""
 
 OPEN = {"unknown": "something unknown", "undecided": "not decided"}
 """What is said of verdicts beside what is named."""
@@ -26,11 +26,12 @@ OPEN = {"unknown": "something unknown", "undecided": "not decided"}
 
 def compared_lines(rows: Rows) -> list[str]:
     """Return each model against each recording, from what `compare` gives for a program."""
+    keys = _keys(rows, "instrument_noise")
 
     def cells(values: Values, place: int) -> list[str]:
         model, noise = values["models"][place], values["instrument_noise"]
         found = []
-        for key in POSE:
+        for key in keys:
             size = model["after_registration"].get(key)
             own = ["-", "-"] if size is None else [number(size["rms"]), _noise(values, noise[key])]
             found += own
@@ -45,17 +46,19 @@ def compared_lines(rows: Rows) -> list[str]:
     for place, model in enumerate(compared[0] if compared else [None]):
         if model is not None:
             tables.append(f"{model['model']}, RMS with registrations, zeros, tare refitted")
-        tables += _table(rows, "strongest dependence", partial(cells, place=place), "compared")
+        own = partial(cells, place=place)
+        tables += _table(rows, keys, "strongest dependence", own, "compared")
         tables.append("")
     return [*tables[:-1], *_below(rows, mistakes)]
 
 
 def diagnosed_lines(rows: Rows) -> list[str]:
     """Return what is missing in each recording, from what `diagnose` gives for a program."""
+    keys = _keys(rows, "noise")
 
     def cells(values: Values) -> list[str]:
         found = []
-        for key in POSE:
+        for key in keys:
             before, after = (values[when].get(f"rms_{key}") for when in ("before", "after"))
             fall = "-" if before is None else f"{number(before)} -> {number(after)}"
             found += [fall, "-" if before is None else _noise(values, values["noise"][key])]
@@ -65,24 +68,32 @@ def diagnosed_lines(rows: Rows) -> list[str]:
         return [each for each in [values["set_up_mistake"]] if each]
 
     title = "held-out RMS, before and after what is missing is added, and instrument noise"
-    return [title, *_table(rows, "missing", cells, "diagnosed"), *_below(rows, mistakes)]
+    return [title, *_table(rows, keys, "missing", cells, "diagnosed"), *_below(rows, mistakes)]
 
 
 def _noise(values: Values, size: float) -> str:
     return f"{at_most(values['noise_known'])} {number(size)}".strip()
 
 
-def _table(rows: Rows, last: str, cells: Callable[[Values], list[str]], done: str) -> list[str]:
+def _keys(rows: Rows, noise: str) -> Sequence[str]:
+    """Return the quantities that were measured, each in one recording at least."""
+    found = [row.result[noise] for row in rows if row.result is not None]
+    return list(dict.fromkeys(key for keys in found for key in keys)) or POSE
+
+
+def _table(
+    rows: Rows, keys: Sequence[str], last: str, cells: Callable[[Values], list[str]], done: str
+) -> list[str]:
     """Return a line for each recording."""
     lines = []
     for row in rows:
         if row.result is None:
             # The path stands before it already.
             why = row.error.removeprefix(f"{row.item}: ").removeprefix(f"{row.item} ")
-            lines.append([str(row.item), "", "", "", "", f"not {done}: {why}"])
+            lines.append([str(row.item), *[""] * 2 * len(keys), f"not {done}: {why}"])
         else:
             lines.append([str(row.item), *cells(row.result)])
-    sizes = [text for key in POSE for text in (title(key), "noise")]
+    sizes = [text for key in keys for text in (title(key), "noise")]
     table = Table("", ["recording", *sizes, last], lines)
     return table.lines()
 
