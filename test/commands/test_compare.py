@@ -166,7 +166,7 @@ def test_a_fleet_says_of_which_model_it_speaks_and_where_a_cell_is_wired_wrong()
     mistake = "Look at the set-up first: with positions times 1000 the error falls"
     model = {"model": "wrist_7", "after_registration": {"s_um": {"rms": 4.9}}, "depends_on": []}
     values = {"models": [model], "instrument_noise": {"s_um": 0.004}, "verdict": ["off", mistake]}
-    values["noise_known"] = True
+    values |= {"noise_known": True, "notes": [], "provenance": {"recordings": {}}}
     rows = (Answer(Path("a"), values), Answer(Path("b"), None, "no recording"))
     title, _, row, _, _, told = compared_lines(rows)
     assert title.startswith("wrist_7, RMS with registrations")
@@ -191,7 +191,7 @@ def test_a_fleet_has_a_table_for_each_model():
         for name, size in (("before", 4.9), ("after", 0.5))
     ]
     values = {"models": models, "instrument_noise": {"s_um": 0.4}, "verdict": []}
-    values["noise_known"] = False
+    values |= {"noise_known": False, "notes": [], "provenance": {"recordings": {}}}
     lines = compared_lines([Answer(Path("a"), values)])
     assert [line.split()[:2] for line in lines] == [
         *(["before,", "RMS"], ["recording", "s"], ["a", "4.9"], []),

@@ -10,10 +10,14 @@ from wrist_stiffness.commands.fleet import Answer
 from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
 
-def diagnosed(verdict, *classes, mistake="", keys=("s_um", "phi_mdeg")):
+def diagnosed(verdict, *classes, mistake="", keys=("s_um", "phi_mdeg"), ended="", note=""):
     members = [[name.split("@") for name in names] for names in classes]
     return {
         "verdict": verdict,
+        "complete": not ended,
+        "ended": ended,
+        "notes": ["m was never fitted to a wrist", *([note] if note else [])],
+        "provenance": {"recordings": {"h": "00"}},
         "findings": [
             {"class": [{"effect": law, "component": place} for law, place in own]}
             for own in members
@@ -37,9 +41,12 @@ def test_each_wrist_has_a_line_that_says_what_is_missing():
         ),
         Answer(Path("d.mcap"), diagnosed("unknown", keys=("phi_mdeg",))),
         Answer(Path("e.mcap"), None, "e.mcap: no measured pose"),
+        Answer(Path("f.mcap"), diagnosed("undecided")),
+        Answer(Path("g.mcap"), diagnosed("unknown", ended="the time was over")),
+        Answer(Path("day/h.mcap"), diagnosed("none", note="h: the recording is damaged: cut")),
     )
     lines = diagnosed_lines(rows)
-    said = {line.split()[0]: line for line in lines[2:7]}
+    said = {line.split()[0]: line for line in lines[2:10]}
     assert said["a.mcap"].endswith("  nothing")
     assert said["b.mcap"].endswith("  backlash@motor_2")
     assert said["b.mcap"].split()[1:5] == ["12.3", "->", "1.23", "1.1"]
@@ -47,10 +54,19 @@ def test_each_wrist_has_a_line_that_says_what_is_missing():
     assert said["d.mcap"].split()[1:7] == ["-", "-", "12.3", "->", "1.23", "1.1"]
     assert said["d.mcap"].endswith("  something unknown")
     assert said["e.mcap"].split(maxsplit=1)[1] == "not diagnosed: no measured pose"
-    assert lines[7:] == ["", f"c.mcap: {look}"]
+    assert said["f.mcap"].endswith("  not decided")
+    assert said["g.mcap"].endswith("  something unknown (the time was over)")
+    assert lines[10:] == ["", f"c.mcap: {look}", "day/h.mcap: the recording is damaged: cut"]
     # All lines of the table are aligned.
     assert len({line.index("  nothing") for line in lines if line.endswith("  nothing")}) == 1
     assert lines[1].index("  missing") == said["b.mcap"].index("  backlash")
+
+
+def test_what_gauges_read_has_columns_of_its_own():
+    rows = (Answer(Path("a.mcap"), diagnosed("none", keys=("gauges_um",))),)
+    _, header, line = diagnosed_lines(rows)
+    assert header.split()[:4] == ["recording", "gauges", "[um]", "noise"]
+    assert line.split() == ["a.mcap", "12.3", "->", "1.23", "1.1", "nothing"]
 
 
 @pytest.mark.slow

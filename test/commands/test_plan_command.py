@@ -9,11 +9,13 @@ from rosbags.highlevel import AnyReader
 
 from wrist_stiffness.cli.main import main
 from wrist_stiffness.inference.answer import Diagnosis, Finding, NotExcited
+from wrist_stiffness.model.model_file import file_sha256
 from wrist_stiffness.planning import pool
 from wrist_stiffness.planning.aims import Answer
 from wrist_stiffness.planning.information import Goal
 from wrist_stiffness.planning.plan import Plan
 from wrist_stiffness.report.plan import plan_summary
+from wrist_stiffness.shipped import shipped_file
 
 LOADS = """
 schema: 1
@@ -126,6 +128,38 @@ def test_table_summary_picture_and_json_belong_together(folder, rows):
     assert float(rows[-1]["time_s"]) < values["duration_s"]
 
 
+def test_the_summary_counts_and_loads_are_those_of_the_table(folder, tmp_path, capsys):
+    """A short commissioning has its load in the long holds alone, and said "loads: none"."""
+    arguments = ["--commissioning", "--minutes", "3.5", *files(tmp_path)[2:]]
+    assert main(["plan", *arguments, "-o", str(tmp_path / "first")]) == 0
+    for made in (tmp_path / "first", folder / "next"):
+        with (made / "plan.csv").open(newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        poses = len({(row["motor_1_deg"], row["motor_2_deg"]) for row in rows})
+        first, by_hand, _ = (made / "summary.txt").read_text().splitlines()[:3]
+        assert f"to {poses} poses; {len(rows)} measurements at rest; loads: gripper" in first
+        assert "take it off after the row" in by_hand
+
+
+def test_the_table_to_fill_in_has_every_turn_and_is_imported(folder, rows, tmp_path):
+    """Of `plan.csv` alone a backlash of 68 mdeg was noise: the sides of approach were lost."""
+    with (folder / "next/path.csv").open(newline="") as stream:
+        header, *path = csv.reader(stream)
+    times = [line[0] for line in path]
+    for row in rows:
+        at = times.index(row["time_s"])
+        assert path[at][1:3] == path[at + 1][1:3] == [row["motor_1_deg"], row["motor_2_deg"]]
+        assert path[at + 1][3:] == [row[name] for name in header[3:]]
+        before = next(line for line in reversed(path[:at]) if line[1:3] != path[at][1:3])
+        came = [float(to) > float(of) for to, of in zip(path[at][1:3], before[1:3], strict=True)]
+        assert came == [side == "+" for side in row["approach"]]
+    table, rests = tmp_path / "filled.csv", {row["time_s"] for row in rows}
+    with table.open("w", newline="") as stream:
+        filled = ([*line, "0.001" if line[0] in rests else ""] for line in path)
+        csv.writer(stream).writerows([[*header, "z_mm"], *filled])
+    assert main(["import", str(table), "-o", str(tmp_path / "filled")]) == 0
+
+
 def test_what_many_rivals_leave_open_is_a_line_for_each_truth():
     rivals = {"creep@joint_1": 0.5, "backlash@motor_1": 0.25, "": 0.75, "gravity@link_3": 0.0}
     answers = tuple(Answer(Goal("inertia@platform", r), d, True) for r, d in rivals.items())
@@ -169,7 +203,10 @@ def test_what_no_load_can_settle_is_a_no_and_writes_nothing(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"schema": 1}, "found.json: schema: 1 is not 2"),
+        (
+            {"schema": 1},
+            "schema: 1 is not 2, the version that this program reads: make the file anew with it",
+        ),
         ({"findings": {}}, "found.json: findings: {} is not a list"),
         ({"noise": {"s_um": 0.0, "phi_mdeg": 1.0}}, "noise.s_um: 0.0 is not above 0"),
         ({"noise": {"gauges_um": 1.0}}, "position and rotation, not gauges_um alone"),
@@ -195,10 +232,25 @@ def test_errors_of_the_diagnosis_name_their_place(tmp_path, capsys, change, word
     assert words in capsys.readouterr().err
 
 
+def test_another_model_than_the_one_diagnosed_is_told(tmp_path, capsys):
+    for name, told in (("other", True), ("palmieri2015_model", False)):
+        model = shipped_file("config/palmieri2015_model.yaml")
+        sha256 = "00" if told else file_sha256(model)
+        made_from = {"models": {name: sha256}, "recordings": {"day_1": "11"}}
+        arguments = files(tmp_path, {**DIAGNOSIS, "provenance": made_from})
+        assert main(["plan", *arguments, "--minutes", "4", "-o", str(tmp_path / name)]) == 0
+        first = (tmp_path / name / "summary.txt").read_text().splitlines()[0]
+        assert first in capsys.readouterr().out
+        words = f"{model} is not what {tmp_path / 'found.json'} was made from: give the model and"
+        assert first.startswith(words) == told
+
+
 def test_the_result_of_another_command_is_told(tmp_path, capsys):
     compared = {key: DIAGNOSIS[key] for key in ("schema", "noise")}
     assert main(["plan", *files(tmp_path, compared), "-o", str(tmp_path / "next")]) == 2
-    words = "found.json: no diagnosis; 'wrist-stiffness diagnose --json FILE' writes one"
+    words = (
+        "found.json: no diagnosis of one wrist; 'diagnose --json FILE' without --each writes one"
+    )
     assert words in capsys.readouterr().err
 
 

@@ -163,11 +163,13 @@ def test_a_mounting_off_by_millimetres_and_degrees_is_found_and_said(tmp_path, m
     ("column", "factor", "told"),
     [
         (0, -1.0, "gauge a.*times -1 .*count up when the ball moves"),
-        (3, 1e-3, "gauge d.*times 1000 .*in m where mm belong"),
+        (3, 1e-3, "gauge d.*times 1000 .*in mm where um belong, or in m where mm belong"),
         (3, 1.0 / 25.4, "gauge d.*times 25.4 .*in inches where mm belong"),
         (4, 1e3, "gauge e.*times 0.001 .*in um where mm belong"),
         (5, -1.0, "gauge level.*times -1 .*count up when the arrow moves"),
         (5, np.pi / 180.0, "gauge level.*in rad where deg belong"),
+        (5, 1e-3, "gauge level.*times 1000 .*in deg where mdeg belong"),
+        (0, 0.0, "gauge a.*check .*that its tip touches the ball at every pose"),
     ],
 )
 def test_a_wrong_sign_or_unit_is_told(tmp_path, model, table, column, factor, told):

@@ -84,8 +84,8 @@ def diagnose(arguments: argparse.Namespace) -> int:
       wrist-stiffness diagnose monday --json why.json
       wrist-stiffness diagnose all_wrists --each --json fleet.json
 
-    next: 'extend MODEL --effect NAME@COMPONENT' adds what was found; 'plan --diagnosis why.json'
-    says what to record where rivals remain.
+    next: 'extend MODEL --effect NAME@COMPONENT' adds what was found; where rivals remain,
+    'plan MODEL --diagnosis why.json' says what to record.
     """
     from wrist_stiffness.commands.diagnose import diagnose_recordings
     from wrist_stiffness.identification.wrist_diagnosis import require_limits

@@ -62,13 +62,14 @@ def plan(arguments: argparse.Namespace) -> int:
     one: it separates the effects that 'diagnose --json' could not tell apart. LOADS.yaml lists the
     loads that you can apply; nothing else is proposed.
 
-    PLAN is a folder: plan.csv (a row for each measurement at rest), trajectory (a recording with
-    the motors' motion as one message on /motor_trajectory), plan.png and summary.txt. Loads that
-    hands put on are due at the times of the table. Drive near the first pose before you start.
+    PLAN is a folder: plan.csv (a row for each measurement at rest), path.csv (the way between them
+    too, a table for 'import' to be filled in), trajectory (a recording with the motors' motion as
+    one message on /motor_trajectory), plan.png and summary.txt. Loads that hands put on are due at
+    the times of plan.csv. Drive near the first pose before you start.
 
     for example:
       wrist-stiffness plan --commissioning --loads loads.yaml --minutes 30 -o first_plan
-      wrist-stiffness plan --diagnosis found.json --recording day_1 --loads loads.yaml -o next_plan
+      wrist-stiffness plan worn.yaml --diagnosis why.json --recording day --loads loads.yaml -o next
       ros2 bag play first_plan/trajectory     # with /motor_trajectory remapped to your controller
 
     loads.yaml:
@@ -106,7 +107,7 @@ def plan(arguments: argparse.Namespace) -> int:
         recordings,
         Progress("plan"),
     )
-    text = plan_summary(planned.plan, arguments.commissioning)
+    text = "\n".join([*planned.remarks, plan_summary(planned.plan, arguments.commissioning)])
     say(arguments, [text], planned.as_values())
     timeline = planned.plan.timeline
     if timeline is None:

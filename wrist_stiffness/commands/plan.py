@@ -8,10 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from wrist_stiffness.commands.read_sessions import Recordings, read_sessions
+from wrist_stiffness.commands.read_sessions import (
+    Recordings,
+    read_sessions,
+    recording_sha256,
+    remarks_of,
+)
 from wrist_stiffness.errors import InputError
 from wrist_stiffness.model.error_model import ErrorModel
-from wrist_stiffness.model.model_file import load_model
+from wrist_stiffness.model.model_file import file_sha256, load_model
 from wrist_stiffness.planning.information import MeasurementNoise
 from wrist_stiffness.planning.loads_file import read_loads
 from wrist_stiffness.planning.plan import Conditions, Plan, plan
@@ -33,7 +38,6 @@ COLUMNS = (
     "hold_s",
     "purpose",
 )
-
 
 LONGEST_MIN = 120.0
 """Minutes of one experiment; planning takes 2 GB and minutes for so many."""
@@ -77,12 +81,14 @@ class Planned:
 
     model: ErrorModel
     plan: Plan
+    remarks: tuple[str, ...]  # on what it was made from
 
     def as_values(self) -> dict[str, Any]:
         """Return what programs read, with units in the names."""
         timeline = self.plan.timeline
         return {
             "schema": 1,
+            "remarks": list(self.remarks),
             "duration_s": None if timeline is None else timeline.duration_s,
             "dwells": [] if timeline is None else plan_rows(timeline),
             "answers": [
@@ -117,6 +123,7 @@ def plan_experiment(
     nothing is left to separate, or nothing fits into the duration.
     """
     model, rng, earlier = load_model(model_file), np.random.default_rng(options.seed), []
+    remarks: list[str] = []
     if diagnosis is None:
         question = commissioning(rng)
         white = np.repeat([1e-6 * options.noise_um, MDEG * options.noise_mdeg], 3)
@@ -125,9 +132,17 @@ def plan_experiment(
         rivals = read_rivals(diagnosis)
         question = between(rivals.classes, rivals.silent, rng)
         noise = dwell_noise(model.table, rivals.noise)
-        if recordings is not None:
-            sessions = read_sessions(recordings, [model], silent)
-            earlier = [as_experiment(model, session) for session in sessions.values()]
+        sessions = {} if recordings is None else read_sessions(recordings, [model], silent)
+        earlier = [as_experiment(model, session) for session in sessions.values()]
+        given = {Path(model_file): file_sha256(model_file)}
+        given |= {path: recording_sha256(path) for path in sessions}
+        remarks += [
+            f"{path} is not what {diagnosis} was made from: give the model and the recordings that "
+            "were diagnosed, or diagnose these"
+            for path, sha256 in given.items()
+            if rivals.diagnosed and sha256 not in rivals.diagnosed
+        ]
+        remarks += remarks_of(sessions.values())
     geometry = model.table.geometry
     conditions = Conditions(
         read_loads(loads, geometry.gravity, geometry.limits.force),
@@ -136,7 +151,7 @@ def plan_experiment(
         None if options.minutes is None else 60.0 * options.minutes,
         options.seed,
     )
-    return Planned(model, plan(model, question, conditions, earlier, progress))
+    return Planned(model, plan(model, question, conditions, earlier, progress), tuple(remarks))
 
 
 def plan_rows(timeline: Timeline) -> list[dict[str, Any]]:

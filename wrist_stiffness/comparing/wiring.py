@@ -144,7 +144,7 @@ LARGE_LOADS = {
 """Units that make loads too large, by whether forces and moments are beyond what a table takes."""
 
 NO_LOAD = Mistake(
-    "the load left out", "does the sensor measure what acts on the platform?", _load(0.0)
+    "the load left out", "does the load that was recorded act on the platform?", _load(0.0)
 )
 """What a load is held against that may be none at all."""
 
@@ -236,6 +236,10 @@ def suspected(
     if not len(logs) or weights.max() < NAMING * total:
         return None
     mistake = list(found)[int(np.argmax(logs))]
+    # Where no load acts, positions do not follow it in any unit either.
+    found[NO_LOAD] = gains(NO_LOAD)
+    if sum(found[NO_LOAD].values()) > logs.max():
+        mistake = NO_LOAD
     if mistake.stiff and any(
         sum(gains(mistake.with_load(times)).values()) > logs.max() for times in BESIDE
     ):

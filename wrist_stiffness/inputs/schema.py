@@ -84,7 +84,10 @@ def version(wanted: int) -> Schema[int]:
 
     def read(node: Node) -> int:
         if number()(node) != wanted:
-            raise node.refuse(f"{node.value:g} is not {wanted}, the version that is read")
+            raise node.refuse(
+                f"{node.value:g} is not {wanted}, the version that this program reads: make the "
+                "file anew with it, or use the program that wrote it"
+            )
         return wanted
 
     return read

@@ -39,6 +39,8 @@ class Rivals:
     classes: tuple[tuple[Effect, ...], ...]
     silent: tuple[Effect, ...]  # what its recordings could not have shown
     noise: Mapping[str, float]  # what noise leaves, RMS by the key of the quantity
+    # SHA-256 of the models and recordings that were diagnosed; empty where nothing states them
+    diagnosed: frozenset[str]
 
 
 def dwell_noise(table: Table, floor: Mapping[str, float]) -> MeasurementNoise:
@@ -68,13 +70,16 @@ def read_rivals(path: str | Path) -> Rivals:
     """
     document = read_json(path, InputError)
     if isinstance(document.value, dict) and "findings" not in document.value:
-        raise document.refuse("no diagnosis; 'wrist-stiffness diagnose --json FILE' writes one")
+        raise document.refuse(
+            "no diagnosis of one wrist; 'diagnose --json FILE' without --each writes one"
+        )
     found = DIAGNOSIS(document)
-    silent = found["not_excited"]
+    silent, made_from = found["not_excited"], found.get("provenance", {})
     return Rivals(
         (*found["findings"], *found["suspects"]),
         tuple({effect.name: effect for effect in silent}.values()),
         found["noise"],
+        frozenset(sha256 for files in made_from.values() for sha256 in files.values()),
     )
 
 
@@ -108,6 +113,11 @@ DIAGNOSIS = record(
         "findings": list_of(_members),
         "suspects": list_of(_members),
         "not_excited": list_of(_effect),
+    },
+    {
+        "provenance": record(
+            dict.fromkeys(("models", "recordings"), mapping_of(text())), others=True
+        )
     },
     others=True,
 )

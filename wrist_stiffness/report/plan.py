@@ -8,6 +8,8 @@ import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from wrist_stiffness import topics
 from wrist_stiffness.atomic_file import partial_of, remove_orphans
 from wrist_stiffness.commands.plan import COLUMNS, plan_rows
@@ -31,6 +33,13 @@ TWICE = (
     "others show."
 )
 
+BY_HAND = (
+    "Put a load on in the seconds of its change_s before a row of plan.csv, and take it off after "
+    "the row, also where the next row has it again: the motors stand still meanwhile.\n"
+    "Without a recording of the motors: add columns of what is measured to path.csv, fill in one "
+    "row of each rest and leave the others in, for there motors turn back; then 'import' it."
+)
+
 
 def require_new_folder(folder: str | Path) -> None:
     """Refuse a folder that exists, or whose parent does not (InputError)."""
@@ -44,7 +53,7 @@ def require_new_folder(folder: str | Path) -> None:
 
 
 def write_plan(table: Table, timeline: Timeline, text: str, folder: str | Path) -> None:
-    """Write `plan.csv`, the recording `trajectory`, `plan.png` and `summary.txt`, all or nothing.
+    """Write `plan.csv`, `path.csv`, `trajectory`, `plan.png` and `summary.txt`, all or nothing.
 
     Raises `InputError` if the folder exists or cannot be written.
     """
@@ -58,6 +67,11 @@ def write_plan(table: Table, timeline: Timeline, text: str, folder: str | Path) 
             rows = csv.DictWriter(stream, COLUMNS)
             rows.writeheader()
             rows.writerows(plan_rows(timeline))
+        with (partial / "path.csv").open("w", newline="") as stream:
+            lines = csv.writer(stream)
+            lines.writerow([*COLUMNS[:3], *COLUMNS[5:11]])
+            for time_s, theta, wrench in timeline.knots:
+                lines.writerow([round(time_s, 3), *np.degrees(theta).round(4), *wrench.round(6)])
         with RecordingWriter(partial / "trajectory") as recording:
             recording.write(topics.MOTOR_TRAJECTORY, trajectory(timeline), 0)
         draw_plan(table, timeline, partial / "plan.png")
@@ -131,12 +145,12 @@ def plan_summary(plan: Plan, commissioning: bool = False) -> str:
 def _what(plan: Plan) -> str:
     if plan.timeline is None:
         return "no plan: nothing that these loads allow would settle any of the questions"
-    loads = sorted({visit.load.name for visit in plan.visits if visit.load.name})
-    poses = len({tuple(visit.theta) for visit in plan.visits})
+    timeline, dwells = plan.timeline, plan.timeline.dwells
+    loads = sorted({dwell.load.name for dwell in dwells if dwell.load.name})
+    poses = len({tuple(dwell.visit.theta) for dwell in dwells})
     return (
-        f"{plan.timeline.duration_s / 60.0:.1f} minutes: {len(plan.visits)} approaches to {poses} "
-        f"poses; {len(plan.timeline.dwells)} measurements at rest; "
-        f"loads: {', '.join(loads) or 'none'}"
+        f"{timeline.duration_s / 60.0:.1f} minutes: {len(timeline.ends)} approaches to {poses} "
+        f"poses; {len(dwells)} measurements at rest; loads: {', '.join(loads) or 'none'}\n{BY_HAND}"
     )
 
 

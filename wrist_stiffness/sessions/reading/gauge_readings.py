@@ -30,7 +30,7 @@ MISMOUNTED = 4.0
 """Standard deviations of its mounting that nobody overlooks: another point or direction."""
 
 LENGTHS = (
-    (1e3, "are they in m where mm belong?"),
+    (1e3, "are they in mm where um belong, or in m where mm belong?"),
     (1e-3, "are they in um where mm belong?"),
     (25.4, "are they in inches where mm belong?"),
     (1.0 / 25.4, "are they in mm where inches belong?"),
@@ -38,6 +38,7 @@ LENGTHS = (
 ANGLES = (
     (180.0 / np.pi, "are they in rad where deg belong?"),
     (1e-3, "are they in mdeg where deg belong?"),
+    (1e3, "are they in deg where mdeg belong?"),
 )
 
 
@@ -128,5 +129,7 @@ def _mounted(
     said = f"gauge {gauge.name} reads as if {place}{turned:.1f} deg from its direction"
     far = float(np.abs(step[1:]).max())
     if far > MISMOUNTED:
-        raise InputError(f"{said}: check its point and direction, and which column is which")
+        touch = "" if gauge.point is None else ", and that its tip touches the ball at every pose"
+        check = "check its point and direction, which column is which"
+        raise InputError(f"{said}: {check}{touch}")
     return own, zero, [f"{said}: taken so"] if far > 1.0 else []
