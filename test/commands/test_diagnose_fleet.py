@@ -86,3 +86,11 @@ def test_a_folder_is_one_table_and_a_bad_recording_a_line_of_it(tmp_path, capsys
     assert [row["diagnosis"] is None for row in rows] == [False, True]
     assert rows[0]["diagnosis"]["verdict"] == "effect"
     assert "no recording" in rows[1]["error"] or "MCAP" in rows[1]["error"]
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_a_fleet_of_which_nothing_can_be_read_is_bad_input(tmp_path, capsys, command):
+    for name in "ab":
+        (tmp_path / f"{name}.mcap").write_bytes(b"no recording")
+    assert main([command, str(tmp_path), "--each"]) == 2
+    assert capsys.readouterr().out.count("not ") >= 2

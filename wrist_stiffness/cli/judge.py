@@ -3,12 +3,42 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from wrist_stiffness.cli.options import JUDGING, MODEL_OPTION, model_named, recordings_named
-from wrist_stiffness.cli.parser import command, flag, option, repeated, say, this_run, value
+from wrist_stiffness.cli.parser import (
+    EXIT_BAD_INPUT,
+    command,
+    flag,
+    option,
+    repeated,
+    say,
+    this_run,
+    value,
+)
 from wrist_stiffness.cli.progress import Progress, Status
 from wrist_stiffness.shipped import shipped_file
+
+if TYPE_CHECKING:
+    from wrist_stiffness.commands.read_sessions import Recordings
+    from wrist_stiffness.report.fleet_lines import Rows
+
+
+def _say_each(
+    arguments: argparse.Namespace,
+    one: Callable[[Recordings], Any],
+    recordings: Recordings,
+    lines: Callable[[Rows], list[str]],
+    what: str,
+) -> int:
+    """Run a command on each recording by itself and say its lines; bad input if none is read."""
+    from wrist_stiffness.commands.fleet import each_recording, table_values
+
+    rows = each_recording(one, recordings, Progress("recordings"))
+    code = say(arguments, lines(rows), table_values(rows, what))
+    return code if any(row.result for row in rows) else EXIT_BAD_INPUT
 
 
 @command(
@@ -39,12 +69,10 @@ def compare(arguments: argparse.Namespace) -> int:
     models = arguments.model or [shipped_file("config/palmieri2015_model.yaml")]
     recordings = recordings_named(arguments.recordings, arguments)
     if arguments.each:
-        from wrist_stiffness.commands.fleet import each_recording, table_values
         from wrist_stiffness.report.fleet_lines import compared_lines
 
         one = partial(compare, models, run=this_run())
-        rows = each_recording(one, recordings, Progress("recordings"))
-        return say(arguments, compared_lines(rows), table_values(rows, "comparison"))
+        return _say_each(arguments, one, recordings, compared_lines, "comparison")
     from wrist_stiffness.report.comparison_report import comparison_lines, report_of_comparison
 
     found = compare(models, recordings, this_run(), Progress)
@@ -95,12 +123,10 @@ def diagnose(arguments: argparse.Namespace) -> int:
     model = model_named(arguments)
     recordings = recordings_named(arguments.recordings, arguments)
     if arguments.each:
-        from wrist_stiffness.commands.fleet import each_recording, table_values
         from wrist_stiffness.report.fleet_lines import diagnosed_lines
 
         one = partial(diagnose_recordings, model, run=this_run(), naming=naming, seconds=seconds)
-        rows = each_recording(one, recordings, Progress("recordings"))
-        return say(arguments, diagnosed_lines(rows), table_values(rows, "diagnosis"))
+        return _say_each(arguments, one, recordings, diagnosed_lines, "diagnosis")
     from wrist_stiffness.report.diagnosis_report import diagnosis_lines, report_of_diagnosis
 
     with Status() as status:
