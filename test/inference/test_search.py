@@ -108,6 +108,20 @@ def test_what_is_handed_over_is_what_is_named(rng):
     assert reading.state.fit.point.z == pytest.approx(problem.fitted((name,)).point.z)
 
 
+def test_each_suspect_is_held_against_the_others_alone(rng):
+    """Where no fit had come by these, each was said to explain what all explain together."""
+    problem = Disappointing(rng, 1.0)
+    search = Search(problem)
+    trio = search._known(problem.fitted(tuple(problem.slopes)[:3]), None)
+    search.states[trio.names] = replace(trio, log=search.base.log + 50.0)
+    classes = read(search).classes
+    assert {each.name for each in classes} == trio.names
+    for each in classes:
+        others = search.states[trio.names - {each.name}]
+        assert each.without is others
+        assert each.log_gain == pytest.approx(trio.evidence.log - others.evidence.log)
+
+
 def test_what_the_last_fit_takes_up_is_no_error_that_is_real(rng):
     """The search ended short of it; then the sets alone say whether an effect is missing."""
     search = Search(Disappointing(rng, 0.0))

@@ -140,9 +140,9 @@ def diagnose_sessions(
         proposals = propose(problem, reading.state.fit, naming, tell, left)
     state = reading.state
     absorbed = taken_up(state.fit.base, [session.name for session in sessions])
-    findings = [_finding(search, each, reading, judge) for each in reading.named]
+    findings = [_finding(each, reading, judge) for each in reading.named]
     suspects = [
-        _finding(search, e, reading, None) for e in reading.classes if e not in reading.named
+        _finding(each, reading, None) for each in reading.classes if each not in reading.named
     ]
     table = state.fit.table
     reported = table.observations.reported
@@ -263,8 +263,8 @@ def _much(errors: Mapping[str, float], noise: Mapping[str, float]) -> dict[str, 
     }
 
 
-def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | None) -> Finding:
-    state = reading.state if judge is not None else search.best
+def _finding(found: Class, reading: Reading, judge: _Judged | None) -> Finding:
+    state = reading.state if judge is not None else found.within
     fit: WristFit = state.fit
     law, place = _law_and_place(found.name)
     effect = fit.base.beyond()[found.name]
@@ -281,7 +281,7 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
     gives = {g.way: size for g, size in state.evidence.given.items() if g.name == found.name}
     sentences = [
         f"{find_law(law).sentence.format(place=place)}.",
-        _shown_by(search, found),
+        _shown_by(found),
         *(told(way, *size) for way, size in gives.items()),
     ]
     return Finding(
@@ -298,10 +298,9 @@ def _finding(search: Search, found: Class, reading: Reading, judge: _Judged | No
     )
 
 
-def _shown_by(search: Search, found: Class) -> str:
+def _shown_by(found: Class) -> str:
     """Return what shows an effect, in a sentence."""
-    without = search.states.get(search.best.names - {found.name}, search.base)
-    tense = None if without.rough else strain(without.fit)
+    tense = None if found.without.rough else strain(found.without.fit)
     if tense and tense.rare:
         return f"Without it the wrist is outside its tolerances ({tense.how})."
     return f"Explains {100.0 * (1.0 - found.left):.3g} % of the error above the noise."

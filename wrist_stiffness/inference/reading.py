@@ -53,6 +53,8 @@ class Class:
         Share of what was left without it that is left with it, above the noise.
     log_gain : float
         Natural logarithm of the evidence with it over that without it.
+    within, without : State
+        The most probable set, and the best fit of its others alone.
     """
 
     members: Mapping[str, float]
@@ -61,6 +63,8 @@ class Class:
     rest: float
     left: float
     log_gain: float
+    within: State
+    without: State
 
     @property
     def name(self) -> str:
@@ -171,7 +175,7 @@ def read(search: Search, naming: float = NAMING) -> Reading:
     named = tuple(
         each for each in classes if each.probability >= naming and len(each.members) <= MOST_MEMBERS
     )
-    state = search.only(frozenset(each.name for each in named))
+    state = search.only(frozenset(each.name for each in named), best)
     first, left = search.base.evidence.unexplained, state.evidence.unexplained
     share = min(left / first, 1.0) if first > 0.0 else float(left > 0.0)
     verdict, probability = _verdict(weights, named, search.base.rough, naming)
@@ -229,13 +233,13 @@ def _class_of(search: Search, weights: Mapping[Names, float], best: State, name:
         if weight >= MEMBER * total
     }
     present = sum(w for names, w in weights.items() if not names.isdisjoint(members))
-    without = search.states.get(others, search.base)
+    without = search.only(others, best)
     before, after = without.evidence.unexplained, best.evidence.unexplained
     left = min(after / before, 1.0) if before > 0.0 else 0.0
     rest = best.evidence.rest(name) if best.rough else 0.0
     itself = 1.0 - stands_in(rest)
     gain = best.evidence.log - without.evidence.log
-    return Class(members, present * itself, itself, rest, left, gain)
+    return Class(members, present * itself, itself, rest, left, gain, best, without)
 
 
 def _in_place_of(name: str, weights: Mapping[Names, float], best: Names) -> dict[str, float]:

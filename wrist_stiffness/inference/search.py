@@ -226,9 +226,9 @@ class Search:
             )
         return max(states, key=lambda each: each.log)
 
-    def only(self, names: Names) -> State:
-        """Return the best fit of some effects of the best set, fitted where none was."""
-        state = self.states.get(names, self.best)
+    def only(self, names: Names, of: State) -> State:
+        """Return the best fit of some effects of a set, fitted where none was."""
+        state = self.states.get(names, of)
         for name in sorted(state.names - names):
             state = self._less(state, name)
         return state

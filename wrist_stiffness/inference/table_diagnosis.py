@@ -147,7 +147,7 @@ def diagnose(
             _finding(each, reading.state, judge.left(reading.state.fit, each.name), after)
             for each in reading.named
         ),
-        tuple(_finding(each, search.best) for each in suspects),
+        tuple(_finding(each, each.within) for each in suspects),
         reading.depends_on,
         reading.unexplained,
         standings(search, reading),
