@@ -274,18 +274,20 @@ class Search:
             least = SHARE * (instead_of.evidence.log - state.evidence.log)
             as_noise = self._in_place(state, instead_of, as_noise, logs)
             beyond = self._in_place(state, instead_of, beyond, logs)
-        leaders, unsloped = self._leaders(as_noise, beyond), _unsloped(as_noise)
-        others = _one_of_each_law(unsloped, leaders) if state.rough else []
-        if not state.rough and self._problem.strained(state.fit):
+        leaders, others = self._leaders(as_noise, beyond), list[Ranked]()
+        strained = not state.rough and self._problem.strained(state.fit)
+        if state.rough or strained:
+            unsloped = [each for each in as_noise if not each.trial.smooth]
+            others = _but(leaders, unsloped if strained else _one_of_each_law(unsloped))
+        if strained:
             # Contact may make up for a fault of the geometry, at many places alike.
-            known = {each.trial.name for each in leaders}
-            leaders += [each for each in unsloped if each.trial.name not in known]
+            leaders, others = [*leaders, *others], []
         best = state.evidence.log + max(self.price, least + NEGLIGIBLE)
         reach: dict[str, float] = {}
 
         def ask(candidates: Sequence[Ranked]) -> None:
             nonlocal best
-            for log, each in self._nearest(state, candidates):
+            for log, each in self._nearest(state, candidates, strained):
                 name, law = each.trial.name, each.trial.law
                 logs[name] = log
                 # As far as others did, its whole fit may reach further.
@@ -360,7 +362,9 @@ class Search:
             known = self.promised.get(each.trial.name, -np.inf)
             self.promised[each.trial.name] = max(known, each.gain)
 
-    def _nearest(self, state: State, chosen: Sequence[Ranked]) -> list[tuple[float, Ranked]]:
+    def _nearest(
+        self, state: State, chosen: Sequence[Ranked], strained: bool
+    ) -> list[tuple[float, Ranked]]:
         """Return candidates with about their evidence, largest first; infinite where open."""
         found: list[tuple[float, Ranked]] = []
         for each in chosen:
@@ -373,8 +377,8 @@ class Search:
                 if not state.names:
                     self.promised[each.trial.name] = log - state.evidence.log
                 # Columns of tolerances that gave way to it are not those of a sound base.
-                bent = not (each.trial.smooth or state.rough)
-                if (each.trial.walls or bent) and log > state.evidence.log:
+                unsure = each.trial.walls or (strained and not each.trial.smooth)
+                if unsure and log > state.evidence.log:
                     # How much it explains, only a whole fit tells.
                     log = np.inf
             found.append((log, each))
@@ -436,16 +440,15 @@ class Search:
         return fit, found
 
 
-def _unsloped(ranking: Sequence[Ranked]) -> list[Ranked]:
-    """Return the candidates whose slopes do not show what they do."""
-    return [each for each in ranking if not each.trial.smooth]
+def _one_of_each_law(ranking: Sequence[Ranked]) -> list[Ranked]:
+    """Return the first place of each law."""
+    return list({each.trial.law: each for each in reversed(ranking)}.values())
 
 
-def _one_of_each_law(ranking: Sequence[Ranked], but: Sequence[Ranked]) -> list[Ranked]:
-    """Return the first place of each law, but for some."""
-    laws = {each.trial.law: each for each in reversed(ranking)}
-    known = {each.trial.name for each in but}
-    return [each for each in laws.values() if each.trial.name not in known]
+def _but(known: Sequence[Ranked], ranking: Sequence[Ranked]) -> list[Ranked]:
+    """Return what of a ranking is not known yet."""
+    names = {each.trial.name for each in known}
+    return [each for each in ranking if each.trial.name not in names]
 
 
 def ranked(at: Evidence, trials: Sequence[Trial]) -> list[Ranked]:
